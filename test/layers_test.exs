@@ -1,5 +1,5 @@
 defmodule System.LayersTest do
-  @moduledoc "Inside an app, rooms call only those that docs/architecture.md names before them."
+  @moduledoc "Inside an app, rooms call only those that docs/architecture.md names before them; names mean one thing."
   use ExUnit.Case, async: true
   @root Path.expand("..", __DIR__)
 
@@ -51,5 +51,48 @@ defmodule System.LayersTest do
 
       assert {app, Enum.sort(wrong)} == {app, []}
     end
+  end
+
+  # The last names of all aliases of a file, with their lines.
+  defp aliases(file) do
+    {_ast, names} =
+      file
+      |> File.read!()
+      |> Code.string_to_quoted!()
+      |> Macro.prewalk([], &{&1, named(&1) ++ &2})
+
+    for {line, name} <- names, do: {name, "#{Path.relative_to(file, @root)}:#{line}"}
+  end
+
+  defp named({:alias, meta, [{:__aliases__, _, _path}, [as: {:__aliases__, _, [name]}]]}),
+    do: [{meta[:line], name}]
+
+  defp named({:alias, meta, [{:__aliases__, _, [_first, _second | _] = path}]}),
+    do: [{meta[:line], List.last(path)}]
+
+  defp named({:alias, meta, [{{:., _, [_base, :{}]}, _, paths}]}),
+    do: for({:__aliases__, _, path} <- paths, do: {meta[:line], List.last(path)})
+
+  defp named(_other), do: []
+
+  test "no alias hides a module of Elixir" do
+    {:ok, modules} = :application.get_key(:elixir, :modules)
+
+    # `Behaviour` may be gone from Elixir, but means what is Elixir's to a reader.
+    taken =
+      for module <- [Behaviour, EEx, ExUnit, IEx, Logger, Mix | modules],
+          ["Elixir", name] <- [module |> Atom.to_string() |> String.split(".")],
+          into: MapSet.new(),
+          do: String.to_atom(name)
+
+    files =
+      for place <- ~w(apps/*/lib apps/*/test test examples config),
+          file <- Path.wildcard(Path.join([@root, place, "**/*.{ex,exs}"])),
+          do: file
+
+    assert length(files) > 100
+
+    assert for(file <- files, {name, where} <- aliases(file), name in taken, do: {where, name}) ==
+             []
   end
 end

@@ -1,6 +1,6 @@
 defmodule Console do
   @moduledoc """
-  What people see and type: the demo and its terminal, the page in the browser, reports, pictures, scenarios, replays.
+  Describes what people see and type: the demo and its terminal, the page in the browser, reports, pictures, scenarios, replays.
 
   A view knows a fleet only by `Console.Live`: it asks for the scene, and passes on commands that
   `Console.Prompt` has checked. No robot knows a view, and no view decides anything.

@@ -10,8 +10,8 @@ defmodule Mesh do
   Without a mesh (`config :swarm, mesh: false`) a node's robots reach only each other, and nodes
   that somebody has connected by hand. `docs/networking.md` explains how to set it up.
   """
+  alias Mesh.Distribution
   alias Mesh.{CommandRelay, Nonblocking, Table}
-  alias Mesh.Distribution.Access
   alias Mesh.Protocol.{NodeTable, Packet, Routing}
 
   @typedoc """
@@ -154,8 +154,8 @@ defmodule Mesh do
   address of this machine than that of its interface. Empty on a node that was started
   without a carrier of the mesh (`Mesh.Distribution.Access`).
   """
-  @spec refused() :: %{Access.refusal() => non_neg_integer()}
-  def refused, do: Access.Refusals.counts()
+  @spec refused() :: %{Distribution.Access.refusal() => non_neg_integer()}
+  def refused, do: Distribution.Access.Refusals.counts()
 
   @doc """
   How many datagrams this node has sent, heard and rejected, and its UDP port; `nil` without a

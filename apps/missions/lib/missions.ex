@@ -1,6 +1,6 @@
 defmodule Missions do
   @moduledoc """
-  What a fleet does: the missions that come with Convoy. Each is a `Robot.Mission`, a pure state machine of which every robot
+  Describes what a fleet does: the missions that come with Convoy. Each is a `Robot.Mission`, a pure state machine of which every robot
   runs its own; this app has no processes.
 
   | name | module | what it does |

@@ -12,6 +12,5 @@ defmodule SwarmPureTest do
   doctest Swarm.Wire.CounterGuard
   doctest Swarm.Message
   doctest Swarm.Membership.Heartbeat
-  doctest Swarm.Formation.Reference
   doctest Swarm.Order
 end

@@ -1,7 +1,6 @@
 defmodule Gather do
   @moduledoc "All robots stand on a circle round a place, and face it. Options: `at` (`{x, y}`), `radius` (metres)."
   @behaviour Robot.Mission
-  alias Robot.Behaviour
 
   @place {:tuple, [{:number, -100, 100, "m"}, {:number, -100, 100, "m"}], "{x, y} in metres"}
   # A robot that nobody has heard for so long is not there.
@@ -55,13 +54,13 @@ defmodule Gather do
   defp step(mission, effects), do: {mission.phase, mission, effects}
 
   defp goal(%{phase: :face, at: {x, y}}, _fleet), do: {:goal, :face, {Gather.Face, x: x, y: y}}
-  defp goal(%{phase: :there}, _fleet), do: {:goal, :stand, {Behaviour.Stop, []}}
+  defp goal(%{phase: :there}, _fleet), do: {:goal, :stand, {Robot.Behaviour.Stop, []}}
 
   defp goal(%{at: {x, y}} = mission, fleet) do
     rank = Enum.find_index(fleet, &(&1 == mission.me))
     angle = 2 * :math.pi() * rank / length(fleet)
     x = x + mission.radius * :math.cos(angle)
     y = y + mission.radius * :math.sin(angle)
-    {:goal, :place, {Behaviour.Goto, x: x, y: y}}
+    {:goal, :place, {Robot.Behaviour.Goto, x: x, y: y}}
   end
 end

@@ -26,7 +26,7 @@ defmodule Agents.Responder do
   """
   use GenServer
   alias Hal.{Event, HardenedServer}
-  alias Robot.{Config, Names}
+  alias Robot.Names
   alias Agents.{Conversation, Envelope, Inbox}
   alias Swarm.Directory
   alias Swarm.Wire
@@ -55,7 +55,7 @@ defmodule Agents.Responder do
   @optional_callbacks info: 2
 
   @impl Robot.Companion
-  def child_spec({%Config{id: id}, options}), do: child_spec({id, options})
+  def child_spec({%Robot.Config{id: id}, options}), do: child_spec({id, options})
 
   def child_spec({name, options}) when is_atom(name),
     do: %{id: {__MODULE__, options[:service]}, start: {__MODULE__, :start_link, [name, options]}}

@@ -1,6 +1,6 @@
 defmodule Bench.Goto do
   @moduledoc """
-  How well one robot that has the floor plan gets from a place to another: `mix bench goto`. A draw is one run in lockstep
+  Measures how well one robot that has the floor plan gets from a place to another: `mix bench goto`. A draw is one run in lockstep
   with default noise, from a random free pose to a random place that a way leads to; all of it follows from map and seed.
   """
   alias Hal.Pose

@@ -1,5 +1,5 @@
 defmodule Bench.Load do
-  @moduledoc "How busy this machine is: figures are worth less on one that does other things, too."
+  @moduledoc "Tells how busy this machine is: figures are worth less on one that does other things, too."
 
   @doc "The load in the last minute; `nil` where nobody knows."
   @spec now() :: float() | nil

@@ -1,6 +1,6 @@
 defmodule Bench.Mesh do
   @moduledoc """
-  What `mix bench swarm` measures, and what it should beat: the cases with their goals, and JADE's
+  Lists what `mix bench swarm` measures, and what it should beat: the cases with their goals, and JADE's
   figures, which were measured separately. Pure. Times are microseconds, memory is bytes.
   """
   alias Console.Cli.Parse

@@ -1,6 +1,6 @@
 defmodule Bench.Stop do
   @moduledoc """
-  What `mix bench stop` measures: the time from a fault on a robot that drives at full speed until
+  Lists what `mix bench stop` measures: the time from a fault on a robot that drives at full speed until
   the stop arrives at the other end of its serial line. Pure.
 
   The stop has arrived when both axes of the base were told a speed of zero. What the base does

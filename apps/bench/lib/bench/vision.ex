@@ -1,6 +1,6 @@
 defmodule Bench.Vision do
   @moduledoc """
-  What `mix bench vision` compares: the ways to search a frame, and the frames. Pure, but for
+  Lists what `mix bench vision` compares: the ways to search a frame, and the frames. Pure, but for
   reading a photograph.
   """
   alias Bench.Vision.Frames

@@ -2,7 +2,7 @@ defmodule Bench.VisionTest do
   use ExUnit.Case, async: true
   import ExUnit.CaptureIO
   alias Bench.Vision
-  alias Bench.Vision.{Beside, Frames, Kernel, Report, Runner}
+  alias Bench.Vision.{Beside, Frames, Report, Runner}
   @moduletag :slow
   doctest Bench.Vision.Beside
   doctest Bench.Vision.Frames
@@ -20,7 +20,7 @@ defmodule Bench.VisionTest do
 
       found =
         work.copies
-        |> Kernel.find(640, 480, tables, min_area)
+        |> Vision.Kernel.find(640, 480, tables, min_area)
         |> Enum.map(&elem(&1, 1))
         |> Enum.reverse()
 
@@ -36,10 +36,10 @@ defmodule Bench.VisionTest do
       assert Enum.all?(found, &(&1 in 9..30))
     end
 
-    assert_raise ArgumentError, fn -> Kernel.find([<<1>>], 640, 480, <<>>, 20) end
+    assert_raise ArgumentError, fn -> Vision.Kernel.find([<<1>>], 640, 480, <<>>, 20) end
 
     assert_raise ArgumentError, fn ->
-      Kernel.find([<<1>>], 640, 480, easy.colours.tables, 20)
+      Vision.Kernel.find([<<1>>], 640, 480, easy.colours.tables, 20)
     end
   end
 

@@ -1,5 +1,5 @@
 defmodule Console.Chaos do
-  @moduledoc "The command `mix chaos`: plays the runs, and prints and writes what comes of them."
+  @moduledoc "Runs the command `mix chaos`: plays the runs, and prints and writes what comes of them."
   alias Console.Chaos.{Options, Report}
   alias Console.Cli.{OutFile, Output, Progress}
   alias Console.Scenario.Recording

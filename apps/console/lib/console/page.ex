@@ -18,7 +18,8 @@ defmodule Console.Page do
   use Supervisor
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_http, :mochiweb_socket_server]}
-  alias Console.Page.{Access, Feed, Request}
+  alias Console.Page
+  alias Console.Page.{Feed, Request}
 
   # Connections at once; one browser takes a few while it loads.
   @most 200
@@ -64,7 +65,7 @@ defmodule Console.Page do
   end
 
   defp guarded(%{address: address, token: token}) do
-    if token != nil or Access.loopback?(address),
+    if token != nil or Page.Access.loopback?(address),
       do: :ok,
       else: {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
   end

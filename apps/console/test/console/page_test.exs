@@ -2,11 +2,11 @@ defmodule Console.PageTest do
   @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
   use ExUnit.Case, async: true
   alias Console.{Browser, Live, Options, Page}
-  alias Console.Page.{Access, Changes, Client, State}
+  alias Console.Page.{Changes, Client, State}
   @moduletag :realtime
   @moduletag :capture_log
 
-  doctest Access
+  doctest Page.Access
   doctest Changes
   doctest Client
   doctest State

@@ -1,6 +1,6 @@
 defmodule Hal.HardenedServer do
   @moduledoc """
-  The process of a `GenServer` module that must not end because of a message that it does not know.
+  Runs the process of a `GenServer` module that must not end because of a message that it does not know.
 
   It calls the same callbacks as `GenServer`, and takes the same calls and casts. The difference is
   in what OTP's loop takes for granted, and what ends any `GenServer`, supervisor or `gen_statem`

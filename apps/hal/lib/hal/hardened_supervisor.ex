@@ -1,6 +1,6 @@
 defmodule Hal.HardenedSupervisor do
   @moduledoc """
-  The process of a module that uses `Supervisor` or `DynamicSupervisor`, which must not end because
+  Runs the process of a module that uses `Supervisor` or `DynamicSupervisor`, which must not end because
   of a message that it does not know (`Hal.HardenedServer`).
 
   OTP's supervisors crash on unknown calls and casts, and log each unknown message. Here OTP's code

@@ -1,6 +1,6 @@
 defmodule Hal.Odometry do
   @moduledoc """
-  What the wheels report: the pose in the robot's own `odom` frame, and the current speed.
+  Holds what the wheels report: the pose in the robot's own `odom` frame, and the current speed.
 
   Poses belong together while `frame` is the same. A driver reports a new frame when it had to
   start again at zero, because its process crashed, and when the counters of its base jumped,

@@ -1,6 +1,6 @@
 defmodule Hal.Ptz do
   @moduledoc """
-  What a pan-tilt-zoom unit can do. Radians: pan positive to the left, tilt positive upwards;
+  Defines what a pan-tilt-zoom unit can do. Radians: pan positive to the left, tilt positive upwards;
   `field_of_view` is the horizontal one at the present zoom.
 
   Run by `Hal.Device`, like `Hal.Drive`.

@@ -10,7 +10,7 @@ defmodule Mcap.Writer do
   Messages are kept until their chunk closes: when it has `chunk_bytes` (1 MiB), when a message is `chunk_ns` (never)
   later than its first one, or by `flush/1`. Of what was written only the index is kept: some 100 bytes a chunk.
   """
-  alias Mcap.{Channel, Record}
+  alias Mcap.Channel
   alias Mcap.Writer.{Channels, Chunk, Summary}
 
   @options [
@@ -42,7 +42,7 @@ defmodule Mcap.Writer do
   @spec next(t()) :: {t(), iodata()}
   def next(t), do: begin(%{t | offset: 0, crc: 0, chunk: %Chunk{}, summary: %Summary{}})
 
-  defp begin(t), do: hand_out(t, [Mcap.magic() | Record.header("", t.options.library)])
+  defp begin(t), do: hand_out(t, [Mcap.magic() | Mcap.Record.header("", t.options.library)])
 
   @doc """
   The id of a channel, which is registered when it is not yet. It is in the file once it has a message.
@@ -118,7 +118,9 @@ defmodule Mcap.Writer do
   @doc "Adds a note of this name: what holds for the file as a whole, such as a version. Several may have one name."
   @spec metadata(t(), String.t(), %{String.t() => String.t()}) :: {t(), iodata()}
   def metadata(t, name, pairs) do
-    record = IO.iodata_to_binary(Record.metadata(Channels.text!(name), Channels.pairs!(pairs)))
+    record =
+      IO.iodata_to_binary(Mcap.Record.metadata(Channels.text!(name), Channels.pairs!(pairs)))
+
     summary = Summary.add_metadata(t.summary, name, t.offset, byte_size(record))
     hand_out(%{t | summary: summary}, record)
   end
@@ -127,7 +129,7 @@ defmodule Mcap.Writer do
   @spec finish(t()) :: iodata()
   def finish(t) do
     {t, chunk} = flush(t)
-    {t, data_end} = hand_out(t, Record.data_end(t.crc))
+    {t, data_end} = hand_out(t, Mcap.Record.data_end(t.crc))
     summary = Summary.bytes(t.summary, t.channels.records, t.offset, t.options.summary_offsets)
     [chunk, data_end, summary | Mcap.magic()]
   end

@@ -1,7 +1,7 @@
 defmodule Mcap.DamageTest do
   @moduledoc "Files that are not as they were written, or never were whole: errors are lines, and nothing else happens."
   use ExUnit.Case, async: true
-  alias Mcap.{DamagedError, Reader, Record, Samples}
+  alias Mcap.{DamagedError, Reader, Samples}
 
   @moduletag :tmp_dir
 
@@ -146,7 +146,7 @@ defmodule Mcap.DamageTest do
   end
 
   test "lengths are not believed", %{tmp_dir: dir} do
-    head = IO.iodata_to_binary([Mcap.magic(), Record.header("", "x")])
+    head = IO.iodata_to_binary([Mcap.magic(), Mcap.Record.header("", "x")])
     huge = for n <- [0x7FFF_FFFF_FFFF_FFFF, 0x8000_0000_0000_0000, 0xFFFF_FFFF_FFFF_FFFF], do: n
 
     for n <- huge, opcode <- [0x03, 0x05, 0x06, 0x0C, 0x80] do
@@ -163,7 +163,7 @@ defmodule Mcap.DamageTest do
     # Within a chunk, where the framing fits.
     for n <- huge do
       chunk = [<<0::little-64, 0::little-64, n::little-64, 0::little-96>>, <<n::little-64>>, "x"]
-      write(dir, [head, Record.frame(0x06, chunk), Record.metadata("a", %{})])
+      write(dir, [head, Mcap.Record.frame(0x06, chunk), Mcap.Record.metadata("a", %{})])
       assert {{[], line}, {[], nil}} = salvage(Path.join(dir, "run.mcap"))
       assert line == nil or line =~ "its lengths do not fit"
     end
@@ -179,17 +179,17 @@ defmodule Mcap.DamageTest do
   end
 
   test "a compression that we do not have is named", %{tmp_dir: dir} do
-    head = [Mcap.magic(), Record.header("", "x")]
+    head = [Mcap.magic(), Mcap.Record.header("", "x")]
 
     for name <- ["zstd", "lz4"] do
       content = [
         <<0::little-128, 9::little-64, 0::little-32>>,
-        Record.text(name),
+        Mcap.Record.text(name),
         <<3::little-64>>,
         "xyz"
       ]
 
-      path = write(dir, [head, Record.frame(0x06, content)])
+      path = write(dir, [head, Mcap.Record.frame(0x06, content)])
       line = "#{path} is compressed with #{name}: only files without compression can be read"
       assert Reader.open(path) == {:error, line}
     end
@@ -206,13 +206,13 @@ defmodule Mcap.DamageTest do
         metadata: %{}
       }
 
-      message = fn n, ns -> [Record.message_head(3, n, ns, 2), <<n::16>>] end
+      message = fn n, ns -> [Mcap.Record.message_head(3, n, ns, 2), <<n::16>>] end
 
       file = [
-        [Mcap.magic(), Record.header("ros2", "x"), Record.frame(0x91, "private")],
-        [Record.channel(channel, 0), for(n <- 1..300, do: message.(n, 1000 - n))],
-        [Record.metadata("a", %{}), message.(301, 5000), Record.data_end(0)],
-        [Record.frame(0x02, <<0::160>>), Mcap.magic()]
+        [Mcap.magic(), Mcap.Record.header("ros2", "x"), Mcap.Record.frame(0x91, "private")],
+        [Mcap.Record.channel(channel, 0), for(n <- 1..300, do: message.(n, 1000 - n))],
+        [Mcap.Record.metadata("a", %{}), message.(301, 5000), Mcap.Record.data_end(0)],
+        [Mcap.Record.frame(0x02, <<0::160>>), Mcap.magic()]
       ]
 
       path = write(dir, file)

@@ -1,6 +1,6 @@
 defmodule Mesh.Backoff do
   @moduledoc """
-  When to try again: for ever, at growing intervals, each a little random, so that the nodes of a
+  Decides when to try again: for ever, at growing intervals, each a little random, so that the nodes of a
   fleet that was cut apart do not all retry at the same time. Pure: the random number is passed
   in.
   """

@@ -1,6 +1,6 @@
 defmodule Mesh.Fault do
   @moduledoc """
-  When a fault of the network is told: once it has lasted for 3 s, and once for as long as it is the same one. Pure;
+  Decides when a fault of the network is told: once it has lasted for 3 s, and once for as long as it is the same one. Pure;
   times are in ms.
   """
 

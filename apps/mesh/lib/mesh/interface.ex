@@ -1,6 +1,6 @@
 defmodule Mesh.Interface do
   @moduledoc """
-  Which of a machine's addresses a node uses, by its option `interface`: an address, the name of a network card, or all
+  Decides which of a machine's addresses a node uses, by its option `interface`: an address, the name of a network card, or all
   (`{0, 0, 0, 0}`). Pure, but for `machine/0`, which says what the machine has now.
 
   All are the IPv4 addresses of all cards that are up, or that of the loopback where there is no other. An address and

@@ -8,10 +8,11 @@ defmodule Mesh.Server do
   opened are tried again with back-off; a robot without a network drives on, and says so (`Mesh.fault/0`).
   """
   use GenServer
+  alias Mesh.Distribution
   alias Hal.{Event, HardenedServer}
-  alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Protocol, Secret, Sockets, Table}
+  alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Secret, Sockets, Table}
   alias Mesh.Protocol.{NodeTable, Packet, Roster, WireTerm}
-  alias Mesh.Distribution.{Access, Dialer, Epmd}
+  alias Mesh.Distribution.{Dialer, Epmd}
 
   @tick_ms 200
   @rejoin_every 50
@@ -26,12 +27,12 @@ defmodule Mesh.Server do
     # Heartbeats must not wait behind a busy robot.
     Process.flag(:priority, :high)
     written = Table.new()
-    :ok = Access.configure(Options.networks(options))
+    :ok = Distribution.Access.configure(Options.networks(options))
     <<session::64>> = :crypto.strong_rand_bytes(8)
     services = consumer.services()
 
     protocol =
-      Protocol.new(
+      Mesh.Protocol.new(
         secret: options.secret,
         roster: Roster.new(node(), options.fleet),
         session: session,
@@ -75,13 +76,13 @@ defmodule Mesh.Server do
   @impl GenServer
   def handle_cast({:speak, to, message}, s) do
     if to == :all or WireTerm.names?(to),
-      do: {:noreply, run(s, Protocol.speak(s.protocol, to, message, now()))},
+      do: {:noreply, run(s, Mesh.Protocol.speak(s.protocol, to, message, now()))},
       else: {:noreply, s}
   end
 
   def handle_cast({:serve, service, to, term}, %{services: services} = s)
       when is_map_key(services, service) and is_atom(to),
-      do: {:noreply, run(s, Protocol.serve(s.protocol, service, to, term, now()))}
+      do: {:noreply, run(s, Mesh.Protocol.serve(s.protocol, service, to, term, now()))}
 
   # To a node that the distribution is connected to, for whatever reason.
   def handle_cast({:introduce, node}, s) when is_atom(node) do
@@ -92,7 +93,7 @@ defmodule Mesh.Server do
   def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
     case ip(node) do
       nil -> {:noreply, s}
-      ip -> {:noreply, run(s, Protocol.knock(s.protocol, {ip, port}, now()))}
+      ip -> {:noreply, run(s, Mesh.Protocol.knock(s.protocol, {ip, port}, now()))}
     end
   end
 
@@ -117,7 +118,7 @@ defmodule Mesh.Server do
   def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
       when socket == sockets.own or socket == sockets.group do
     s = %{s | heard: s.heard + 1}
-    {:noreply, run(s, Protocol.hear(s.protocol, datagram, {ip, port}, now()))}
+    {:noreply, run(s, Mesh.Protocol.hear(s.protocol, datagram, {ip, port}, now()))}
   end
 
   def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
@@ -129,7 +130,7 @@ defmodule Mesh.Server do
   def handle_info(:tick, s) do
     {chance, state} = :rand.uniform_s(s.chance)
     s = connect(%{s | chance: state, ticks: s.ticks + 1, machine: machine(s.machine)})
-    s = run(s, Protocol.tick(s.protocol, Dialer.links(), now(), chance))
+    s = run(s, Mesh.Protocol.tick(s.protocol, Dialer.links(), now(), chance))
     {:noreply, s |> judge() |> publish() |> schedule()}
   end
 
@@ -190,7 +191,7 @@ defmodule Mesh.Server do
     %{
       s
       | sockets: Sockets.follow(sockets, named),
-        protocol: Protocol.locate(s.protocol, addresses)
+        protocol: Mesh.Protocol.locate(s.protocol, addresses)
     }
   end
 
@@ -274,7 +275,12 @@ defmodule Mesh.Server do
 
   # For processes that read it without asking.
   defp publish(%{protocol: %{node_table: node_table, roster: roster, rejected: rejected}} = s) do
-    :ok = Access.heard(for({ip, _port} <- NodeTable.addresses(node_table), do: ip), now())
+    :ok =
+      Distribution.Access.heard(
+        for({ip, _port} <- NodeTable.addresses(node_table), do: ip),
+        now()
+      )
+
     written = Table.write(s.written, node_table, roster, rejected, s.fault.told, now())
     %{s | written: written}
   end

@@ -1,6 +1,6 @@
 defmodule Mesh.Strategy do
   @moduledoc """
-  How nodes find each other. A strategy names addresses to send a beacon to; a node that hears one
+  Describes how nodes find each other. A strategy names addresses to send a beacon to; a node that hears one
   answers, and from then on both know each other's address, for ever.
 
   A strategy is a pair of pure functions, asked five times a second; `Mesh.Strategy.Gossip` and

@@ -1,7 +1,7 @@
 defmodule Mesh.FreshnessTest do
   # That a datagram was made now, as functions: without sockets, and an hour is a number.
   use ExUnit.Case, async: true
-  alias Mesh.{Air, Protocol}
+  alias Mesh.Air
   alias Mesh.Protocol.{NodeTable, Packet}
 
   @hour_ms 3_600_000
@@ -38,7 +38,9 @@ defmodule Mesh.FreshnessTest do
 
   # What a node would send to whoever sends it this.
   defp replies(air, to, datagram, address) do
-    {_protocol, effects} = Protocol.hear(air.stations[to], datagram, address, Air.time(air, to))
+    {_protocol, effects} =
+      Mesh.Protocol.hear(air.stations[to], datagram, address, Air.time(air, to))
+
     for {:send, ^address, reply} <- effects, do: reply
   end
 
@@ -85,7 +87,10 @@ defmodule Mesh.FreshnessTest do
 
   test "what is under way for less than 2 s counts, what is longer does not" do
     air = two()
-    {_protocol, effects} = Protocol.speak(air.stations["b"], :all, beat(1), Air.time(air, "b"))
+
+    {_protocol, effects} =
+      Mesh.Protocol.speak(air.stations["b"], :all, beat(1), Air.time(air, "b"))
+
     [{:send, _address, datagram} | _] = effects
 
     for {ms, messages} <- [{1_900, [beat(1)]}, {2_010, []}] do
@@ -140,7 +145,7 @@ defmodule Mesh.FreshnessTest do
         datagram = Enum.at(tape, rem(n, length(tape)))
 
         {protocol, effects} =
-          Protocol.hear(a.stations["a"], datagram, address, Air.time(a, "a") + div(n, 5))
+          Mesh.Protocol.hear(a.stations["a"], datagram, address, Air.time(a, "a") + div(n, 5))
 
         {put_in(a.stations["a"], protocol), for({:send, _, reply} <- effects, do: reply) ++ sent}
       end)
@@ -153,14 +158,14 @@ defmodule Mesh.FreshnessTest do
     assert {map_size(protocol.challenged), protocol.replay.senders, protocol.node_table.nodes} ==
              {2, %{}, %{}}
 
-    {protocol, _sent} = Protocol.tick(protocol, [], Air.time(a, "a") + 2_000, 0.5)
+    {protocol, _sent} = Mesh.Protocol.tick(protocol, [], Air.time(a, "a") + 2_000, 0.5)
     assert protocol.challenged == %{}
   end
 
   test "an answer is as large as what asked for it, however many addresses a node has" do
     air = two()
     addresses = for n <- 1..20, do: {{10, 0, 1, n}, 4370}
-    many = Protocol.locate(air.stations["a"], [air.addresses["a"] | addresses])
+    many = Mesh.Protocol.locate(air.stations["a"], [air.addresses["a"] | addresses])
     assert length(many.addresses) == Packet.most_addresses()
     air = put_in(air.stations["a"], many)
     [challenge | _] = for d <- tape(Air.run(air, 15_000), "b"), kind(d) == :challenge, do: d
@@ -194,13 +199,13 @@ defmodule Mesh.FreshnessTest do
     old = air.addresses["b"]
     new = {{10, 0, 0, 77}, 4370}
     air = put_in(air.addresses["b"], new)
-    air = %{air | stations: Map.update!(air.stations, "b", &Protocol.locate(&1, [new]))}
+    air = %{air | stations: Map.update!(air.stations, "b", &Mesh.Protocol.locate(&1, [new]))}
     air = air |> Air.speak("b", :all, beat(1)) |> Air.run(10)
     assert delivered(air) == [beat(1)]
     assert NodeTable.addresses(air.stations["a"].node_table) == [new]
 
     {_protocol, [{:send, _, datagram} | _]} =
-      Protocol.speak(air.stations["b"], :all, beat(2), Air.time(air, "b"))
+      Mesh.Protocol.speak(air.stations["b"], :all, beat(2), Air.time(air, "b"))
 
     air = Air.inject(air, "a", datagram, old)
     assert delivered(air) == [beat(1)]

@@ -11,7 +11,7 @@ defmodule Mesh.ReplayTest do
   defp tape(peer) do
     Enum.flat_map_reduce(1..300, peer, fn n, peer ->
       then_ms = now() - @hour_ms + 200 * n
-      keep_back(peer, Protocol.speak(peer.protocol, :all, {:beat, :b, 1, n}, then_ms))
+      keep_back(peer, Mesh.Protocol.speak(peer.protocol, :all, {:beat, :b, 1, n}, then_ms))
     end)
   end
 
@@ -34,7 +34,7 @@ defmodule Mesh.ReplayTest do
 
     # It was not dead: its own word is believed again at once.
     peer = until(peer, fn _ -> Mesh.alive() == [other()] end)
-    act(peer, Protocol.speak(peer.protocol, :all, {:beat, :b, 1, 301}, now()))
+    act(peer, Mesh.Protocol.speak(peer.protocol, :all, {:beat, :b, 1, 301}, now()))
     Hal.Lines.eventually(fn -> match?({1, 301, _age_ms}, Mesh.beat(:b)) end)
   end
 
@@ -44,7 +44,7 @@ defmodule Mesh.ReplayTest do
     peer =
       Enum.reduce(1..20, peer, fn n, peer ->
         beat = {:beat, :b, 1, n}
-        {tape, peer} = keep_back(peer, Protocol.speak(peer.protocol, :all, beat, now()))
+        {tape, peer} = keep_back(peer, Mesh.Protocol.speak(peer.protocol, :all, beat, now()))
         for socket <- [foreign, peer.socket], do: play(tape, socket)
         assert_receive {:delivered, :all, _node, ^beat}
         refute_received {:delivered, :all, _node, ^beat}
@@ -81,7 +81,9 @@ defmodule Mesh.ReplayTest do
 
     for {socket, n} <- [{foreign, 1}, {peer.socket, 2}], reduce: peer do
       peer ->
-        stop = Protocol.serve(peer.protocol, :stop, :everywhere, {:stop, n}, now() - @hour_ms)
+        stop =
+          Mesh.Protocol.serve(peer.protocol, :stop, :everywhere, {:stop, n}, now() - @hour_ms)
+
         {tape, peer} = keep_back(peer, stop)
         play(tape, socket)
         assert_receive {:stop, ^other, {:stop, ^n}}

@@ -5,21 +5,21 @@ defmodule Mesh.ServerTest do
   test "what it hears goes to the consumer that it was given, and into the table", %{peer: peer} do
     {node, other} = {node(), other()}
     beat = {:beat, :b, 7, 9}
-    peer = act(peer, Protocol.speak(peer.protocol, :all, beat, now()))
+    peer = act(peer, Mesh.Protocol.speak(peer.protocol, :all, beat, now()))
     assert_receive {:delivered, :all, ^other, ^beat}
     assert {7, 9, _age_ms} = Mesh.beat(:b)
     assert Mesh.heard?(:b) and Mesh.robots() == %{b: other}
 
     letter = {:letter, :b, "to a"}
     until(peer, fn peer -> peer.protocol.node_table.nodes["#{node}"] != nil end)
-    peer = act(peer, Protocol.serve(peer.protocol, :rows, node, [1, 2], now()))
+    peer = act(peer, Mesh.Protocol.serve(peer.protocol, :rows, node, [1, 2], now()))
     assert_receive {:rows, ^other, [1, 2]}
-    peer = act(peer, Protocol.speak(peer.protocol, :all, letter, now()))
+    peer = act(peer, Mesh.Protocol.speak(peer.protocol, :all, letter, now()))
     assert_receive {:delivered, :all, ^other, ^letter}
 
     # A service that nobody takes, and a message that is of no sense.
-    peer = act(peer, Protocol.serve(peer.protocol, :hints, node, :x, now()))
-    peer = act(peer, Protocol.speak(peer.protocol, :all, :junk, now()))
+    peer = act(peer, Mesh.Protocol.serve(peer.protocol, :hints, node, :x, now()))
+    peer = act(peer, Mesh.Protocol.speak(peer.protocol, :all, :junk, now()))
     until(peer, fn _ -> match?(%{service: 1, message: 1}, Mesh.rejected()) end)
   end
 

@@ -4,7 +4,7 @@ defmodule Mesh.Air do
   link is cut; ticks come every 200 ms. Each station has a clock of its own, which began at another
   time. Pure but for `:rand`, which ExUnit seeds.
   """
-  alias Mesh.{Protocol, Secret, Strategy}
+  alias Mesh.{Secret, Strategy}
   alias Mesh.Protocol.Roster
 
   @group {{239, 255, 67, 86}, 4371}
@@ -41,7 +41,7 @@ defmodule Mesh.Air do
           do: begin(Strategy.Static, Enum.map(peers, &air.addresses[&1]))
 
     protocol =
-      Protocol.new(
+      Mesh.Protocol.new(
         secret: options[:secret] || secret(),
         roster: Roster.new(:"#{name}@lab", options[:fleet] || [:a, :b, :c, :d, :e, :f]),
         session: options[:session] || :rand.uniform(1_000_000_000),
@@ -91,20 +91,20 @@ defmodule Mesh.Air do
   end
 
   defp tick(name, air) do
-    act(air, name, Protocol.tick(air.stations[name], [], time(air, name), :rand.uniform()))
+    act(air, name, Mesh.Protocol.tick(air.stations[name], [], time(air, name), :rand.uniform()))
   end
 
   def speak(air, name, to, message),
-    do: act(air, name, Protocol.speak(air.stations[name], to, message, time(air, name)))
+    do: act(air, name, Mesh.Protocol.speak(air.stations[name], to, message, time(air, name)))
 
   @doc "A datagram from outside."
   def inject(air, name, datagram, address \\ {{10, 9, 9, 9}, 1}),
-    do: act(air, name, Protocol.hear(air.stations[name], datagram, address, time(air, name)))
+    do: act(air, name, Mesh.Protocol.hear(air.stations[name], datagram, address, time(air, name)))
 
   defp arrive({_at, from, to, datagram}, air) do
     case air.stations do
       %{^to => protocol} ->
-        act(air, to, Protocol.hear(protocol, datagram, air.addresses[from], time(air, to)))
+        act(air, to, Mesh.Protocol.hear(protocol, datagram, air.addresses[from], time(air, to)))
 
       _off ->
         air

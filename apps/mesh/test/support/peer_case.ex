@@ -12,7 +12,7 @@ defmodule Mesh.PeerCase do
     quote do
       import Mesh.PeerCase
       import Mesh.SocketPeer, only: [until: 2, act: 2, keep_back: 2, now: 0]
-      alias Mesh.{Protocol, SocketPeer}
+      alias Mesh.SocketPeer
     end
   end
 

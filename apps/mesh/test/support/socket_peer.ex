@@ -4,7 +4,7 @@ defmodule Mesh.SocketPeer do
   it, and what it makes can be kept back, as by a jammed radio, and sent later, by whomever.
   """
   import ExUnit.Assertions, only: [flunk: 1]
-  alias Mesh.{Air, FakeConsumer, Protocol}
+  alias Mesh.{Air, FakeConsumer}
   alias Mesh.Protocol.Roster
 
   defstruct [:socket, :address, :protocol, told: []]
@@ -19,7 +19,7 @@ defmodule Mesh.SocketPeer do
   @doc "A node of that name on a socket."
   def new(name, fleet, {socket, address}) do
     protocol =
-      Protocol.new(
+      Mesh.Protocol.new(
         secret: Air.secret(),
         roster: Roster.new(name, fleet),
         session: :rand.uniform(1_000_000_000),
@@ -41,7 +41,7 @@ defmodule Mesh.SocketPeer do
       peer
       | socket: socket,
         address: address,
-        protocol: Protocol.locate(peer.protocol, [address])
+        protocol: Mesh.Protocol.locate(peer.protocol, [address])
     }
   end
 
@@ -56,7 +56,7 @@ defmodule Mesh.SocketPeer do
 
       true ->
         peer
-        |> act(Protocol.tick(peer.protocol, [], now(), 0.5))
+        |> act(Mesh.Protocol.tick(peer.protocol, [], now(), 0.5))
         |> listen()
         |> until(done?, turns - 1)
     end
@@ -65,7 +65,7 @@ defmodule Mesh.SocketPeer do
   defp listen(%{socket: socket} = peer) do
     receive do
       {:udp, ^socket, ip, port, datagram} ->
-        peer |> act(Protocol.hear(peer.protocol, datagram, {ip, port}, now())) |> listen()
+        peer |> act(Mesh.Protocol.hear(peer.protocol, datagram, {ip, port}, now())) |> listen()
     after
       50 -> peer
     end

@@ -13,7 +13,6 @@ defmodule Missions.Explore do
   """
   alias Hal.Pose
   alias Missions.Explore.{Choice, Frontiers, Options, SharedMap}
-  alias Robot.Behaviour
 
   @behaviour Robot.Mission
 
@@ -223,10 +222,11 @@ defmodule Missions.Explore do
   defp said(%{at: {x, y}, far: far}, tiles),
     do: [goal: {round(x * 1_000), round(y * 1_000)}, far_mm: round(far * 1_000), tiles: tiles]
 
-  defp goal(%{ahead: nil}), do: {:goal, :stand, {Behaviour.Stop, []}}
+  defp goal(%{ahead: nil}), do: {:goal, :stand, {Robot.Behaviour.Stop, []}}
 
   defp goal(%{ahead: {x, y}, goal: n}),
-    do: {:goal, {:go, n}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance, unmapped: true}}
+    do:
+      {:goal, {:go, n}, {Robot.Behaviour.Goto, x: x, y: y, tolerance: @tolerance, unmapped: true}}
 
   defp claim(mission) do
     %{

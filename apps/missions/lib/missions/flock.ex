@@ -16,7 +16,6 @@ defmodule Missions.Flock do
   """
   alias Hal.Pose
   alias Missions.Flock.{Field, Members, Motion, Options}
-  alias Robot.Behaviour
 
   @behaviour Robot.Mission
 
@@ -141,7 +140,7 @@ defmodule Missions.Flock do
     {mission, stages} = mission |> look(agents, percept) |> count_on()
     {mission, told} = tell(mission)
     {velocity, mission} = velocity(mission, agents, percept)
-    goal = {:goal, :flock, {Behaviour.Velocity, velocity: velocity}}
+    goal = {:goal, :flock, {Robot.Behaviour.Velocity, velocity: velocity}}
     result(mission, stages ++ told ++ [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
 

@@ -22,7 +22,6 @@ defmodule Missions.Landmark do
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
-  alias Robot.Behaviour
   alias Robot.Localiser.Anchors
   alias Swarm.{Formation, Message}
   alias Swarm.Agreement.Round
@@ -65,10 +64,10 @@ defmodule Missions.Landmark do
   defdelegate option_table, to: Landmark.Options, as: :table
 
   @impl Robot.Mission
-  def messages, do: {1, round: :shared, place: :shared}
+  def messages, do: {1, round: :shared, claim: :shared}
 
   @impl Robot.Mission
-  def claims, do: {1, Landmark.Claim}
+  def claims, do: {2, Landmark.Claim}
 
   @impl Robot.Mission
   defdelegate stale(claim), to: Landmark.Claim
@@ -149,8 +148,12 @@ defmodule Missions.Landmark do
     {mission.phase, Rounds.hear(mission, from, letter), relays}
   end
 
-  defp hear({:ok, %Message{kind: :place, body: anchor}}, mission),
-    do: still(ReferenceInbox.anchor(mission, anchor))
+  defp hear({:ok, %Message{kind: :claim, body: claim}}, mission) do
+    case Landmark.Claim.of(%{claim: claim}) do
+      %{anchor: nil} -> still(mission)
+      %{anchor: anchor} -> still(ReferenceInbox.anchor(mission, anchor))
+    end
+  end
 
   defp hear(_other, mission), do: still(mission)
 
@@ -196,20 +199,23 @@ defmodule Missions.Landmark do
 
   defp stage(_phase, _mission), do: []
 
-  defp act(:stand, mission), do: {mission, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+  defp act(:stand, mission),
+    do: {mission, [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, 0.0}]}
 
   defp act(:scan, mission) do
     options = [colour: mission.colour]
-    {mission, [{:goal, {:search, mission.since_ms}, {Behaviour.FindBlob, options}}, {:look, 0.0}]}
+
+    {mission,
+     [{:goal, {:search, mission.since_ms}, {Robot.Behaviour.FindBlob, options}}, {:look, 0.0}]}
   end
 
   defp act(:roam, mission),
-    do: {mission, [{:goal, :roam, {Behaviour.Wander, []}}, {:look, 0.0}]}
+    do: {mission, [{:goal, :roam, {Robot.Behaviour.Wander, []}}, {:look, 0.0}]}
 
   defp act(:hold, %{place: nil} = mission), do: act(:stand, mission)
 
   defp act(:hold, mission) do
-    goal = {Behaviour.Follow, target: mission.place, velocity: {0.0, 0.0}}
+    goal = {Robot.Behaviour.Follow, target: mission.place, velocity: {0.0, 0.0}}
     {mission, [{:goal, {:hold, mission.since_ms}, goal}, {:look, 0.0}]}
   end
 

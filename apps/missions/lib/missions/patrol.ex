@@ -13,7 +13,6 @@ defmodule Missions.Patrol do
   """
   alias Hal.Pose
   alias Missions.Patrol.{Ages, Auction, Motivation, Options}
-  alias Robot.Behaviour
 
   @behaviour Robot.Mission
 
@@ -261,11 +260,13 @@ defmodule Missions.Patrol do
     ]
   end
 
-  defp goal(%{motivation: %{active: nil}}), do: {:goal, :stand, {Behaviour.Stop, []}}
+  defp goal(%{motivation: %{active: nil}}), do: {:goal, :stand, {Robot.Behaviour.Stop, []}}
 
   defp goal(%{motivation: %{active: active}} = mission) do
     {x, y} = mission.points[active]
-    {:goal, {:visit, mission.visits, active}, {Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
+
+    {:goal, {:visit, mission.visits, active},
+     {Robot.Behaviour.Goto, x: x, y: y, tolerance: @tolerance}}
   end
 
   defp claim(%{motivation: %{active: active}} = mission) do

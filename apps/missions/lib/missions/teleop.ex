@@ -10,7 +10,6 @@ defmodule Missions.Teleop do
   Its phases are `:wait` and `:driven`. Without this mission a `move` ends the mission that a robot has; within it the robot
   stays, and waits for the next hand.
   """
-  alias Robot.Behaviour
 
   @behaviour Robot.Mission
 
@@ -67,7 +66,7 @@ defmodule Missions.Teleop do
     words = mission.words + 1
     mission = %{mission | phase: :driven, words: words, twist: twist}
     for_ms = min(for_s * 1_000, mission.dead_man_ms)
-    move = {Behaviour.Move, linear: elem(twist, 0), turn: elem(twist, 1), for_ms: for_ms}
+    move = {Robot.Behaviour.Move, linear: elem(twist, 0), turn: elem(twist, 1), for_ms: for_ms}
     {:driven, mission, [{:goal, {:word, words}, move}, {:look, 0.0}, {:claim, claim(mission)}]}
   end
 
@@ -85,7 +84,7 @@ defmodule Missions.Teleop do
 
   defp wait(mission) do
     mission = %{mission | phase: :wait, twist: nil}
-    stand = {:goal, :stand, {Behaviour.Stop, []}}
+    stand = {:goal, :stand, {Robot.Behaviour.Stop, []}}
     {:wait, mission, [stand, {:claim, claim(mission)}]}
   end
 

@@ -3,9 +3,8 @@ defmodule Swarm.MemberTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Swarm.{Member, Message}
-  alias Missions.Landmark.Beat
+  alias Missions.Landmark.{Beat, Reference}
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
 
   @beat Beat.new(pose: {900, 0, 0}, phase: :search)
@@ -20,7 +19,7 @@ defmodule Swarm.MemberTest do
     size: 3,
     places: [1, 2]
   }
-  @report %{found: true, size_ppm: 5, pose: {1, 2, 3}, led: 0, of: 0}
+  @report %{merit: 5, pose: {1, 2, 3}, led: 0, of: 0}
   @letter %Round.Letter{
     id: {1, 1, :mag2},
     view: [:mag1, :mag2],
@@ -72,8 +71,8 @@ defmodule Swarm.MemberTest do
       {:column, 0.0},
       {:diamond, Bitwise.bsl(1, 70)},
       %{},
-      %{found: true, size_ppm: 1, pose: {1, 2, 3}, more: deep(100)},
-      %{size_ppm: 1},
+      %{merit: 1, pose: {1, 2, 3}, more: deep(100)},
+      %{merit: 1},
       %{deep(5) => deep(5)},
       self(),
       make_ref(),
@@ -145,12 +144,16 @@ defmodule Swarm.MemberTest do
           {Message.new(:mag2, :command, :start), :not_a_message},
           {Message.new(nil, :heartbeat, @beat), :not_a_message},
           {Message.new("mag2", :heartbeat, @beat), :not_a_message},
-          {Message.new(:mag2, :place, @beat), :place},
+          {Message.new(:mag2, :claim, @beat), :claim},
           {Message.new(:mag2, :round, @anchor), :round},
           {Message.new(:mag2, :heartbeat, @letter), :heartbeat},
           {Message.new(:mag2, :heartbeat, Beat.new(epoch: Bitwise.bsl(1, 64))), :heartbeat},
-          {Message.new(:mag2, :place, %{@anchor | order: [:mag1, :mag1]}), :place},
-          {Message.new(:mag2, :place, %{@anchor | places: [1, 1]}), :place},
+          {Beat.pass_on(:mag2, %{@anchor | order: [:mag1, :mag1]}), :claim},
+          {Beat.pass_on(:mag2, %{@anchor | places: [1, 1]}), :claim},
+          {Beat.pass_on(:mag2, %{@anchor | places: List.duplicate(1, 100_000)}), :claim},
+          {Beat.pass_on(:mag2, %{@anchor | epoch: Bitwise.bsl(1, 64)}), :claim},
+          {Beat.pass_on(:mag2, %{@anchor | leader: nil}), :claim},
+          {Beat.pass_on(:mag2, Map.put(@anchor, :more, 1)), :claim},
           {Message.new(:mag2, :round, %{@letter | view: [:mag1 | :mag2]}), :round},
           {Message.new(:mag2, :round, %{@letter | digest: "short"}), :round}
         ] do
@@ -162,7 +165,9 @@ defmodule Swarm.MemberTest do
   end
 
   test "valid messages are heard" do
-    for {kind, body} <- [heartbeat: @beat, place: @anchor, round: @letter],
+    %{body: claim} = Beat.pass_on(:mag2, @anchor)
+
+    for {kind, body} <- [heartbeat: @beat, claim: claim, round: @letter],
         do: assert(hear(member(), Message.new(:mag2, kind, body)).receiver.rejected == %{})
   end
 

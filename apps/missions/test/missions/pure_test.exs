@@ -1,10 +1,12 @@
 defmodule Missions.PureTest do
   use ExUnit.Case, async: true
   alias Missions.Landmark
-  alias Swarm.Formation.Reference
-  alias Swarm.Message
+  alias Missions.Landmark.Reference
   doctest Missions
+  doctest Landmark.Claim
+  doctest Landmark.Company
   doctest Landmark.Options
+  doctest Landmark.Reference
   doctest Landmark.Policy
   doctest Landmark.Transitions
 
@@ -22,10 +24,11 @@ defmodule Missions.PureTest do
 
   test "an anchor of an impossible epoch is not accepted as a leader's" do
     {_phase, mission, []} = Landmark.init(:mag2, [])
-    far = Message.new(:mag3, :place, %{@anchor | epoch: 999_999_999})
+    far = Landmark.Beat.pass_on(:mag3, %{@anchor | epoch: 999_999_999})
     {_phase, same, _effects} = Landmark.handle({:message, far}, mission)
     assert same.anchor == nil
-    {_phase, led, _effects} = Landmark.handle({:message, %{far | body: @anchor}}, mission)
+    near = Landmark.Beat.pass_on(:mag3, @anchor)
+    {_phase, led, _effects} = Landmark.handle({:message, near}, mission)
     assert led.anchor == @anchor
   end
 

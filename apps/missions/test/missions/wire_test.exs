@@ -6,7 +6,7 @@ defmodule Missions.WireTest do
   test "a node that has just started understands all messages of a moving fleet" do
     [one] = Cluster.start(1, robots: true)
 
-    anchor = %Swarm.Formation.Reference{
+    anchor = %Missions.Landmark.Reference{
       leader: one.name,
       epoch: 1,
       sequence: 1,
@@ -25,7 +25,7 @@ defmodule Missions.WireTest do
       for phase <- Missions.Landmark.Transitions.phases(),
           do: Swarm.Message.new(one.name, :heartbeat, %{beat | phase: phase})
 
-    place = Swarm.Message.new(one.name, :place, %{anchor | landmark: {0, 0}, still: true})
+    place = Missions.Landmark.Beat.pass_on(one.name, %{anchor | landmark: {0, 0}, still: true})
 
     for message <- [place | letters] do
       payload = Mesh.Protocol.Packet.pack({:all, message})

@@ -10,4 +10,10 @@ defmodule Missions.Landmark.Beat do
     plain = [boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}]
     struct!(Heartbeat, plain ++ [claim: Claim.new(Landmark, Map.new(claim))] ++ body)
   end
+
+  @doc "The message by which a robot passes an anchor on to its child."
+  def pass_on(from, anchor) do
+    claim = Robot.Mission.Claim.new(Missions.Landmark, %{anchor: anchor})
+    Swarm.Message.new(from, :claim, claim)
+  end
 end

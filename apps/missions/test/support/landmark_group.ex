@@ -5,7 +5,7 @@ defmodule Missions.Landmark.Group do
   and reorders messages, and can be cut into two. Pure except for `:rand`, which ExUnit seeds.
   """
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Localiser.Anchors
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
@@ -261,7 +261,7 @@ defmodule Missions.Landmark.Group do
         group = put_in(group.robots[id].goal, {:over, tag})
         event(group, id, {:outcome, tag, if(robot.share, do: 1, else: 0)})
 
-      %{goal: {_tag, {Behaviour.Follow, options}}, pose: pose} = robot ->
+      %{goal: {_tag, {Robot.Behaviour.Follow, options}}, pose: pose} = robot ->
         put_in(group.robots[id], %{robot | pose: toward(pose, options[:target])})
 
       _standing ->
@@ -304,6 +304,9 @@ defmodule Missions.Landmark.Group do
     to = if to == :all, do: ids(group) -- [id], else: List.wrap(to)
     Enum.reduce(to, group, &send_one(&1, id, message, &2))
   end
+
+  defp carry_out({:claim, to, %{anchor: anchor}}, id, group),
+    do: carry_out({:send, to, Missions.Landmark.Beat.pass_on(id, anchor)}, id, group)
 
   defp carry_out({:claim, claim}, id, group), do: put_in(group.robots[id].claim, claim)
 

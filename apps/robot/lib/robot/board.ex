@@ -24,6 +24,7 @@ defmodule Robot.Board do
   | `:doing` | `:executive` | the chosen wish and the outcome of the goal (3) |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
   | `{:hung, part}` | `:watch` | where `:gate`, `:executive` or `:pilot` hangs (4) |
+  | `:departed` | `:executive` | the odometry frame in which it has left its start pose (`Robot.Departure`) |
   | `:pose` | `:executive` | the estimate in the `map` frame |
   | `:asking` | `:pilot` | while a callback of the mission runs (5) |
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
@@ -46,19 +47,24 @@ defmodule Robot.Board do
     7. `%{mission: {module, options} or nil, changing?: while it is being replaced, says: line for
        people}` (`Swarm.Replacement`)
 
-  This process owns the tables and does nothing else, so that they survive a crash of their
-  writers. All of it is lost with the board, on purpose, with one exception.
+  This process owns the tables, so that they survive a crash of their writers, and writes what must
+  survive more: the **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is
+  slow, or hangs, delays neither the gate's steps nor the executive's ticks. All the rest is lost
+  with the board, on purpose.
 
-  The **e-stop latch** is a table of its own, written by the gate only, so that a gate that
-  restarts is still latched. With a file (real robots) it also survives a restart of the board and
-  of the machine: the file exists while the latch is set.
+  The latch is a table of its own, written by the gate only, so that a gate that restarts is still
+  latched. With a file (real robots) it also survives a restart of the board and of the machine: the
+  file exists while the latch is set. Who must know that it does asks by `saved/2`.
   """
   use GenServer
   alias Hal.HardenedServer
-  alias Robot.{Config, Names}
+  alias Robot.Board.Files
+  alias Robot.{Departure, Names}
   alias Vision.Detections
 
-  @enforce_keys [:robot, :table, :latch, :clock, :file, :since_ms]
+  @again_ms 1_000
+
+  @enforce_keys [:robot, :table, :latch, :clock, :since_ms]
   defstruct @enforce_keys
 
   @typedoc "The tables and the clock, for readers and writers; the board started at `since_ms`."
@@ -67,7 +73,6 @@ defmodule Robot.Board do
           table: :ets.tid(),
           latch: :ets.tid(),
           clock: {module(), atom(), list()},
-          file: Path.t() | nil,
           since_ms: integer()
         }
 
@@ -101,6 +106,7 @@ defmodule Robot.Board do
     presses: :gate,
     doing: :executive,
     goal: :executive,
+    departed: :executive,
     pose: :executive,
     uncertainty: :executive,
     mission: :pilot,
@@ -114,8 +120,8 @@ defmodule Robot.Board do
   }
 
   @doc "Starts the board of a robot."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
 
   @doc "The board of a robot on this node."
   @spec find(robot :: atom()) :: {:ok, t()} | :error
@@ -219,66 +225,112 @@ defmodule Robot.Board do
   @spec latched?(t()) :: boolean()
   def latched?(%__MODULE__{latch: latch}), do: :ets.member(latch, :estop)
 
-  @doc "Latches the e-stop in the table only, without a disk; `latch/1` should follow."
-  @spec hold(t()) :: :ok
-  def hold(%__MODULE__{latch: latch}) do
-    :ets.insert(latch, {:estop, true})
-    :ok
-  end
-
-  @doc "Latches the e-stop, in the table even if the file cannot be written."
+  @doc "Latches the e-stop. This process writes the file, and reports one that cannot be written."
   @spec latch(t()) :: :ok
-  def latch(%__MODULE__{} = board) do
-    :ok = hold(board)
-    if board.file, do: checked(board, File.write(board.file, "e-stop\n", [:sync]))
-    :ok
+  def latch(%__MODULE__{latch: latch} = board) do
+    :ets.insert(latch, {:estop, true})
+    cast(board, :latch)
   end
 
   @doc "Releases the latch. If the file cannot be removed, the next start is latched again."
   @spec unlatch(t()) :: :ok
   def unlatch(%__MODULE__{latch: latch} = board) do
-    if board.file && File.exists?(board.file), do: checked(board, File.rm(board.file))
     :ets.delete(latch, :estop)
-    :ok
+    cast(board, :latch)
   end
 
+  @doc "Applies `then` when the file of the latch says what the latch does, or could not be written."
+  @spec saved(t(), then :: Robot.Config.call()) :: :ok
+  def saved(%__MODULE__{} = board, {_m, _f, _a} = then), do: cast(board, {:saved, then})
+
+  @doc "Whether it does already: asked by whoever has waited long enough for `saved/2`."
+  @spec saved?(t()) :: boolean()
+  def saved?(%__MODULE__{latch: latch} = board),
+    do: :ets.lookup(latch, :file) == [{:file, latched?(board)}]
+
+  @doc "Notes, for after a restart, that the robot has left its start pose; a failure is tried again each second."
+  @spec depart(t(), Departure.frame()) :: :ok
+  def depart(%__MODULE__{} = board, frame) do
+    put(board, :executive, :departed, frame, now(board))
+    cast(board, :depart)
+  end
+
+  @doc "The frame in which the robot has left its start pose; `nil` if it has not."
+  @spec departed(t()) :: Departure.frame() | nil
+  def departed(board) do
+    with {:ok, frame, _at_ms} <- fetch(board, :departed, :infinity),
+         do: frame,
+         else: (:error -> nil)
+  end
+
+  defp cast(%__MODULE__{robot: robot}, message),
+    do: GenServer.cast(Names.via(robot, :board), message)
+
   @impl GenServer
-  def init(%Config{} = config) do
+  def init(%Robot.Config{} = config) do
     board = %__MODULE__{
       robot: config.id,
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),
       latch: :ets.new(__MODULE__, [:public]),
       clock: config.clock,
-      file: config.estop_file,
-      since_ms: Config.now(config)
+      since_ms: Robot.Config.now(config)
     }
 
-    if board.file && File.exists?(board.file), do: :ets.insert(board.latch, {:estop, true})
+    {files, latched?, frame} = Files.read(config)
+    :ets.insert(board.latch, {:file, latched?})
+    if latched?, do: :ets.insert(board.latch, {:estop, true})
+    if frame, do: put(board, :executive, :departed, frame, board.since_ms)
 
     case Names.register(config.id, :board, board) do
-      :ok -> {:ok, board}
+      :ok -> {:ok, {board, files}}
       {:error, {:already_registered, pid}} -> {:stop, {:already_started, pid}}
     end
   end
 
   @impl GenServer
-  def handle_call(_unknown, _from, board), do: HardenedServer.drop(board)
+  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_cast(_unknown, board), do: HardenedServer.drop(board)
+  def handle_cast(:latch, s), do: {:noreply, save(s)}
+
+  # The latch itself decides, not the order in which the messages of several processes arrive.
+  def handle_cast({:saved, {m, f, a} = then}, {board, _files} = s) do
+    if HardenedServer.callable?(then) do
+      unless saved?(board), do: save(s)
+      apply(m, f, a)
+      {:noreply, s}
+    else
+      HardenedServer.drop(s)
+    end
+  end
+
+  def handle_cast(:depart, s), do: {:noreply, noted(s)}
+  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_info(_unknown, board), do: HardenedServer.drop(board)
+  def handle_info(:depart, s), do: {:noreply, noted(s)}
+  def handle_info(_unknown, s), do: HardenedServer.drop(s)
+
+  defp save({board, files} = s) do
+    latched? = latched?(board)
+    :ok = Files.latch(files, latched?)
+    :ets.insert(board.latch, {:file, latched?})
+    s
+  end
+
+  defp noted({board, files} = s) do
+    with frame when frame != nil <- departed(board),
+         {:error, files} <- Files.depart(files, frame) do
+      Process.send_after(self(), :depart, @again_ms)
+      {board, files}
+    else
+      nil -> s
+      {:ok, files} -> {board, files}
+    end
+  end
 
   defp writer({:peer, _id}), do: :comms
   defp writer({:health, device}), do: device
   defp writer({:hung, _part}), do: :watch
   defp writer(key), do: Map.get(@writers, key)
-
-  defp checked(_board, :ok), do: :ok
-
-  defp checked(board, {:error, reason}) do
-    about = %{robot: board.robot, file: board.file, reason: reason}
-    Hal.Event.execute([:robot, :estop_file, :error], %{}, about)
-  end
 end

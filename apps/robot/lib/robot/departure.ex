@@ -1,6 +1,6 @@
 defmodule Robot.Departure do
   @moduledoc """
-  Whether a robot whose processes, or whose node, start again on the way stands at its start pose. A drive that starts
+  Decides whether a robot whose processes, or whose node, start again on the way stands at its start pose. A drive that starts
   again counts from zero, so the odometry alone would say so: `Robot.Departure.Note` remembers in which odometry frame
   (`Hal.Odometry`) the robot has left it. Pure.
   """

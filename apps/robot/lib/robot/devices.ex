@@ -22,7 +22,7 @@ defmodule Robot.Devices do
   """
   use Supervisor
   alias Hal.HardenedSupervisor
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.Gate
 
@@ -30,11 +30,11 @@ defmodule Robot.Devices do
   @patience_ms 5_000
 
   @doc "Starts the devices of a robot whose board is running."
-  @spec start_link(Config.t()) :: Supervisor.on_start()
-  def start_link(%Config{} = config), do: HardenedSupervisor.start_link(__MODULE__, config)
+  @spec start_link(Robot.Config.t()) :: Supervisor.on_start()
+  def start_link(%Robot.Config{} = config), do: HardenedSupervisor.start_link(__MODULE__, config)
 
   @impl Supervisor
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     for role <- @roles, pid = Names.whereis(id, role), do: :ok = await_end(pid)
     board = Board.find!(id)
     write = fn writer -> {Board, :sense, [board, writer]} end
@@ -85,7 +85,7 @@ defmodule Robot.Devices do
 
   def health(_board, _frame), do: :ok
 
-  defp blob_detector(%Config{camera: nil}, _sink), do: []
+  defp blob_detector(%Robot.Config{camera: nil}, _sink), do: []
 
   defp blob_detector(config, sink) do
     [
@@ -98,14 +98,14 @@ defmodule Robot.Devices do
     ]
   end
 
-  defp view(%Config{camera: nil}, _demand), do: []
+  defp view(%Robot.Config{camera: nil}, _demand), do: []
 
   defp view(config, demand),
     do: [{Vision.View, demand: demand, name: Names.via(config.id, :view)}]
 
-  defp saver(%Config{save_pictures: nil}), do: []
+  defp saver(%Robot.Config{save_pictures: nil}), do: []
 
-  defp saver(%Config{id: id, save_pictures: options}) do
+  defp saver(%Robot.Config{id: id, save_pictures: options}) do
     ours = [prefix: Atom.to_string(id), view: Names.via(id, :view), name: Names.via(id, :saver)]
     [{Vision.Saver, options ++ ours}]
   end

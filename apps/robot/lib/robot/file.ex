@@ -18,7 +18,6 @@ defmodule Robot.File do
   """
   alias Hal.Options.Wording
   alias Hal.{Pose, Profile}
-  alias Robot.Config
   alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
   alias Robot.Navigation.MapFile
 
@@ -46,9 +45,9 @@ defmodule Robot.File do
   @type t :: %__MODULE__{
           id: atom(),
           profile: Profile.t(),
-          drive: Config.module_options(),
-          ptz: Config.module_options() | nil,
-          camera: Config.module_options() | nil,
+          drive: Robot.Config.module_options(),
+          ptz: Robot.Config.module_options() | nil,
+          camera: Robot.Config.module_options() | nil,
           colours: struct() | nil,
           save_pictures: keyword() | nil,
           limits: keyword(float()),
@@ -160,11 +159,11 @@ defmodule Robot.File do
 
   An error is the line of `Robot.Config.new/1`, or of a drive that does not fit the body.
   """
-  @spec config(t()) :: {:ok, Config.t()} | {:error, String.t()}
+  @spec config(t()) :: {:ok, Robot.Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
     options = robot |> Map.take(@config) |> Map.put(:plan, robot.map && robot.map.grid)
 
-    with {:ok, config} <- options |> Map.to_list() |> Config.new(),
+    with {:ok, config} <- options |> Map.to_list() |> Robot.Config.new(),
          {:ok, drive} <- Device.fit(robot.drive, config.profile),
          do: {:ok, %{config | drive: drive}}
   end

@@ -9,7 +9,7 @@ defmodule Robot.Fleet do
   """
   use DynamicSupervisor
   alias Hal.HardenedSupervisor
-  alias Robot.{Config, Names}
+  alias Robot.Names
 
   @doc "Starts a fleet without robots. `:name` as in `GenServer`."
   @spec start_link(keyword()) :: Supervisor.on_start()
@@ -17,9 +17,9 @@ defmodule Robot.Fleet do
     do: HardenedSupervisor.start_dynamic(__MODULE__, [], Keyword.take(options, [:name]))
 
   @doc "Starts a robot. `restart` determines whether its end also ends the fleet, see above."
-  @spec start_robot(Supervisor.supervisor(), Config.t(), :temporary | :permanent) ::
+  @spec start_robot(Supervisor.supervisor(), Robot.Config.t(), :temporary | :permanent) ::
           {:ok, pid()} | {:error, {:already_started, pid()} | term()}
-  def start_robot(fleet, %Config{} = config, restart \\ :temporary)
+  def start_robot(fleet, %Robot.Config{} = config, restart \\ :temporary)
       when restart in [:temporary, :permanent] do
     child = Supervisor.child_spec({Robot.Supervisor, config}, restart: restart)
     DynamicSupervisor.start_child(fleet, child)

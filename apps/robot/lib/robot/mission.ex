@@ -1,6 +1,6 @@
 defmodule Robot.Mission do
   @moduledoc """
-  What a robot does over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time
+  Describes what a robot does over minutes: a pure state machine, run by `Robot.Control.Pilot` in real time
   and by simulations in lockstep (`Robot.Mission.Runner`). It sends nothing, keeps no timers and
   reads no clock: deadlines are integers, compared with `percept.at_ms` at each tick.
 
@@ -27,6 +27,7 @@ defmodule Robot.Mission do
     * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:`, `leader:` and the fields
       of `c:claims/0` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
       stand in its status, and `formed:`, that it has what the mission wants, which ends a run of the demo
+    * `{:claim, to, map}` - says such fields of `c:claims/0` at once to one robot, to several, or to `:all`, and to nobody else
     * `{:stage, name, map}` - reports an event to people; `says:` is how it is told, after the robot's name
   """
   @type effect ::
@@ -34,6 +35,7 @@ defmodule Robot.Mission do
           | {:tell, to :: atom() | [atom()] | :all, kind :: atom(), fields :: keyword()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:claim, map()}
+          | {:claim, to :: atom() | [atom()] | :all, map()}
           | {:stage, atom(), map()}
 
   @typedoc "An effect that the controller carries out (`Robot.Control.Controller.obey/2`)."

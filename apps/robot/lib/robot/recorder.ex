@@ -19,7 +19,7 @@ defmodule Robot.Recorder do
   """
   use GenServer
   alias Hal.{Event, HardenedServer}
-  alias Robot.{Config, Names}
+  alias Robot.Names
   alias Robot.Recorder.{Options, Output, Pictures, Queue}
 
   @roles Queue.roles()
@@ -49,8 +49,8 @@ defmodule Robot.Recorder do
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [options]}, shutdown: @call_ms}
 
   @doc "Makes a robot of this config hand what goes in and out of it to its recorder."
-  @spec join(Config.t()) :: Config.t()
-  def join(%Config{id: id} = config), do: %{config | trace: {__MODULE__, :trace, [id]}}
+  @spec join(Robot.Config.t()) :: Robot.Config.t()
+  def join(%Robot.Config{id: id} = config), do: %{config | trace: {__MODULE__, :trace, [id]}}
 
   @doc "Sends an entry of a robot's trace to its recorder, if there is one. Never waits."
   @spec trace(robot :: atom(), Robot.Trace.entry()) :: :ok

@@ -1,6 +1,6 @@
 defmodule Robot.Recording do
   @moduledoc """
-  What Convoy's own part of a recording of robots of processes holds, and how it is written. Pure.
+  Describes what Convoy's own part of a recording of robots of processes holds, and how it is written. Pure.
 
   A recording is an MCAP file (`Mcap`). Beside the topics that other programs draw
   (`Robot.Recording.Topics`) it has these of ours, in Erlang's external term format:

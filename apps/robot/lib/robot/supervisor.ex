@@ -20,18 +20,18 @@ defmodule Robot.Supervisor do
   """
   use Supervisor
   alias Hal.HardenedSupervisor
-  alias Robot.{Board, Config, Devices, Names}
+  alias Robot.{Board, Devices, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.{Gate, LivenessMonitor}
 
   @doc "Starts a robot. `Robot.Names` must be running."
-  @spec start_link(Config.t()) :: Supervisor.on_start()
-  def start_link(%Config{} = config),
+  @spec start_link(Robot.Config.t()) :: Supervisor.on_start()
+  def start_link(%Robot.Config{} = config),
     do: HardenedSupervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
 
   @doc "The child specification of a robot, with the robot's id as part of the child's id."
-  @spec child_spec(Config.t()) :: Supervisor.child_spec()
-  def child_spec(%Config{} = config) do
+  @spec child_spec(Robot.Config.t()) :: Supervisor.child_spec()
+  def child_spec(%Robot.Config{} = config) do
     %{
       id: {__MODULE__, config.id},
       start: {__MODULE__, :start_link, [config]},
@@ -40,7 +40,7 @@ defmodule Robot.Supervisor do
   end
 
   @impl Supervisor
-  def init(%Config{} = config) do
+  def init(%Robot.Config{} = config) do
     parts = [
       {Board, config},
       {Devices, config},

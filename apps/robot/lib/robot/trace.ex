@@ -24,26 +24,25 @@ defmodule Robot.Trace do
     * `:executive` - `looks`: whether there is a head that may turn
     * `:pilot` - `state`: what it published last, `:idle` or `{mission, phase}`; `nil` at a start
   """
-  alias Robot.Config
 
   @type kind :: :begin | :checkpoint | :input | :effect
   @type entry :: {role :: atom(), kind(), what :: term(), at_ms :: integer()}
   @type state :: {Robot.Safety.Reflex.t() | Robot.Control.Controller.t() | struct(), map()}
 
   @doc "Records an input of the process in this role."
-  @spec input(Config.t(), atom(), term(), integer()) :: :ok
+  @spec input(Robot.Config.t(), atom(), term(), integer()) :: :ok
   def input(config, role, what, at_ms), do: write(config.trace, {role, :input, what, at_ms})
 
   @doc "Records an effect of the process in this role."
-  @spec effect(Config.t(), atom(), term(), integer()) :: :ok
+  @spec effect(Robot.Config.t(), atom(), term(), integer()) :: :ok
   def effect(config, role, what, at_ms), do: write(config.trace, {role, :effect, what, at_ms})
 
   @doc "Records the state with which the process in this role starts, before anything else."
-  @spec begin(Config.t(), atom(), state(), integer()) :: :ok
+  @spec begin(Robot.Config.t(), atom(), state(), integer()) :: :ok
   def begin(config, role, state, at_ms), do: write(config.trace, {role, :begin, state, at_ms})
 
   @doc "Offers the state of the process in this role, between two inputs."
-  @spec checkpoint(Config.t(), atom(), (... -> state()), integer()) :: :ok
+  @spec checkpoint(Robot.Config.t(), atom(), (... -> state()), integer()) :: :ok
   def checkpoint(config, role, state, at_ms),
     do: write(config.trace, {role, :checkpoint, state, at_ms})
 

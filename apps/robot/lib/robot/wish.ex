@@ -1,6 +1,6 @@
 defmodule Robot.Wish do
   @moduledoc """
-  What a behaviour proposes for the next tick: a speed, its weight (0 to 1), and optionally where
+  Describes what a behaviour proposes for the next tick: a speed, its weight (0 to 1), and optionally where
   the camera should look (`look`, pan in radians, left positive).
 
   A behaviour that wants to reach a place also gives the desired planar `velocity` (map frame,

@@ -58,18 +58,27 @@ defmodule Robot.BoardTest do
     assert Board.find(:nobody) == :error
   end
 
+  defp saved(board) do
+    :ok = Board.saved(board, {Kernel, :send, [self(), :saved]})
+    assert_receive :saved
+    assert Board.saved?(board)
+  end
+
   test "the latch outlives everything where it has a file", %{tmp_dir: dir} do
     file = Path.join(dir, "estop")
     board = board(:board5, estop_file: file)
     refute Board.latched?(board)
     Board.latch(board)
     assert Board.latched?(board)
+    saved(board)
+    assert File.exists?(file)
     stop_supervised!(:board5)
 
     board = board(:board5, estop_file: file)
     assert Board.latched?(board)
     Board.unlatch(board)
     refute Board.latched?(board)
+    saved(board)
     stop_supervised!(:board5)
     refute Board.latched?(board(:board5, estop_file: file))
   end
@@ -81,7 +90,9 @@ defmodule Robot.BoardTest do
     board = board(:board6, estop_file: Path.join(dir, "missing/estop"))
     Board.latch(board)
     file = Path.join(dir, "missing/estop")
+    saved(board)
     assert_received %{robot: :board6, file: ^file, reason: :enoent}
+    refute_received %{robot: :board6}
     assert Board.latched?(board)
   end
 

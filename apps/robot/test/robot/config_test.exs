@@ -1,6 +1,5 @@
 defmodule Robot.ConfigTest do
   use ExUnit.Case, async: true
-  alias Robot.Config
   doctest Robot.Config
   doctest Robot.Names
 
@@ -29,23 +28,26 @@ defmodule Robot.ConfigTest do
           estop_file: :file,
           trace: self()
         ] do
-      assert {:error, line} = Config.new(Keyword.put(@good, option, value))
+      assert {:error, line} = Robot.Config.new(Keyword.put(@good, option, value))
 
       assert line =~
                ~r/^robot option #{option}[^ ]* (cannot be .*: .* (is allowed|at most)|is not known: allowed are)/
 
       refute line =~ "\n"
-      assert_raise ArgumentError, line, fn -> Config.new!(Keyword.put(@good, option, value)) end
+
+      assert_raise ArgumentError, line, fn ->
+        Robot.Config.new!(Keyword.put(@good, option, value))
+      end
     end
   end
 
   test "a robot with a camera must know colours" do
-    assert {:error, line} = Config.new(@good ++ [camera: {Some.Camera, []}])
+    assert {:error, line} = Robot.Config.new(@good ++ [camera: {Some.Camera, []}])
     assert line =~ "option colours"
   end
 
   test "what is missing is named" do
-    assert {:error, line} = Config.new(id: :mag1, profile: Hal.Profile.magellan())
+    assert {:error, line} = Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan())
     assert line =~ "option drive is missing: {module, options}"
   end
 

@@ -129,6 +129,24 @@ defmodule Robot.DepartureTest do
     refute_received {[:robot, :departure_file, :failed], _}
   end
 
+  test "a disk that hangs stops no tick", %{path: path} do
+    id = :departure4
+    robot(id, departure_file: path)
+    Robot.Case.hang(path <> ".new")
+    frame = make_ref()
+    count(id, frame, Pose.new(0, 0))
+    assert eventually(fn -> radius(id) end) < 0.2
+    count(id, frame, Pose.new(0.5, 0))
+    board = Robot.Board.find!(id)
+    assert eventually(fn -> Robot.Board.departed(board) end) == Departure.frame(frame)
+    tick = fn -> elem(Robot.Board.fetch(board, :doing, :infinity), 1).tick end
+    before = tick.()
+    assert eventually(fn -> if(tick.() > before + 3, do: true) end)
+    refute File.exists?(path)
+    Robot.Case.resume(path <> ".new")
+    assert eventually(fn -> if(File.exists?(path), do: true) end)
+  end
+
   test "an executive that starts again knows its place, and tells nothing else later", %{
     path: path
   } do

@@ -1,7 +1,7 @@
 defmodule Robot.Safety.FenceTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Body, Config}
+  alias Robot.Body
   alias Robot.Safety.Reflex
   alias Robot.Fence
   @moduletag :slow
@@ -244,8 +244,8 @@ defmodule Robot.Safety.FenceTest do
 
   test "shapes of no sense are named in a line" do
     base = [id: :fence1, profile: Profile.magellan(), drive: {Some.Drive, []}]
-    assert {:ok, %{fence: %Fence{}}} = Config.new(base ++ [fence: {{0, 0}, {1, 2.5}}])
-    assert {:ok, %{fence: nil, dry_run: false}} = Config.new(base)
+    assert {:ok, %{fence: %Fence{}}} = Robot.Config.new(base ++ [fence: {{0, 0}, {1, 2.5}}])
+    assert {:ok, %{fence: nil, dry_run: false}} = Robot.Config.new(base)
 
     for {bad, part} <- [
           {:big, "polygon of 3 to 64"},
@@ -260,7 +260,7 @@ defmodule Robot.Safety.FenceTest do
           {[{0, 0}, {2, 2}, {2, 0}, {0, 2}], "do not cross"},
           {[{0, 0}, {4, 0}, {4, 3}, {2, 0}, {0, 3}], "do not cross"}
         ] do
-      assert {:error, line} = Config.new(base ++ [fence: bad])
+      assert {:error, line} = Robot.Config.new(base ++ [fence: bad])
       assert line =~ "option fence cannot be" and line =~ part and not (line =~ "\n")
     end
   end

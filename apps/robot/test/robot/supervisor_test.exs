@@ -4,7 +4,6 @@ defmodule Robot.SupervisorTest do
   @moduletag :realtime
   @moduletag :capture_log
   import ExUnit.CaptureLog
-  alias Robot.Behaviour
 
   @zero Twist.zero()
   @above [:executive, :pilot]
@@ -176,13 +175,13 @@ defmodule Robot.SupervisorTest do
     assert {:error, "Robot.Safety.Gate is not a behaviour" <> _} = goal.({Gate, []})
 
     assert {:error, "Robot.Behaviour.Goto: goto option x is missing: a number" <> _} =
-             goal.({Behaviour.Goto, y: 1})
+             goal.({Robot.Behaviour.Goto, y: 1})
 
     assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
-             goal.({Behaviour.Goto, [1]})
+             goal.({Robot.Behaviour.Goto, [1]})
 
     assert {:error, "Robot.Behaviour.Follow: follow option target cannot be %Hal.Pose{" <> _} =
-             goal.({Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: nil}})
+             goal.({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: nil}})
 
     assert {:error, ":roll is not a goal" <> _} = goal.(:roll)
     roll = {Acts.Roll, twist: Twist.zero()}

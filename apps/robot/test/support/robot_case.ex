@@ -92,6 +92,20 @@ defmodule Robot.Case do
     pid
   end
 
+  @doc "Makes a file of which every write hangs, as on a disk that does not answer, until `resume/1`."
+  def hang(file) do
+    {_nothing, 0} = System.cmd("mkfifo", [file])
+    # No thread of this VM may hang there for ever.
+    ends = ["if=#{file}", "iflag=nonblock", "of=/dev/null"]
+    on_exit(fn -> System.cmd("dd", ends, stderr_to_stdout: true) end)
+  end
+
+  @doc "Lets the write go on that hangs there."
+  def resume(file) do
+    {_written, 0} = System.cmd("timeout", ["20", "cat", file])
+    :ok
+  end
+
   @doc "Waits until the wheels roll."
   def rolls do
     assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0

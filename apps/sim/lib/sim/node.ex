@@ -10,7 +10,7 @@ defmodule Sim.Node do
 
   Its messages to the launcher go through `Sim.Node.Reporter`.
   """
-  alias Sim.Fleet.Nodes.Config
+  alias Sim.Fleet.Nodes
   alias Sim.Node.Reporter
 
   @doc "A part of a fleet in a node of its own: a robot or the world."
@@ -27,7 +27,7 @@ defmodule Sim.Node do
   defp run do
     :ok = :io.setopts(:standard_io, [:binary])
 
-    case Config.read(IO.gets("")) do
+    case Nodes.Config.read(IO.gets("")) do
       {:ok, config} ->
         spawn_link(&watch/0)
         become(config)

@@ -3,7 +3,6 @@ defmodule Sim.NodesTest do
   use ExUnit.Case, async: true
   alias Sim.Fleet.Nodes
   alias Sim.Fleet.Nodes.{Child, Command}
-  alias Sim.Fleet.Nodes.Config
   doctest Sim.Fleet.Nodes.Command
   doctest Sim.Fleet.Nodes.Config
 
@@ -33,13 +32,13 @@ defmodule Sim.NodesTest do
   test "a config is one line, whatever is in it, and nothing else is accepted as one" do
     {:ok, setup} = Sim.Trial.Setup.new(robots: [:mag1], map: "hall")
     part = {Sim.Node.World, %{name: :w, world: setup.world}}
-    config = %Config{node: :"world@127.0.0.1", launcher: self(), mesh: [], part: part}
-    line = Config.line(config)
+    config = %Nodes.Config{node: :"world@127.0.0.1", launcher: self(), mesh: [], part: part}
+    line = Nodes.Config.line(config)
     assert [_one, ""] = String.split(line, "\n")
-    assert Config.read(line) == {:ok, config}
+    assert Nodes.Config.read(line) == {:ok, config}
 
     for junk <- ["", "\n", "AAAA\n", Base.encode64("x"), :eof, ~c"list"] do
-      assert {:error, told} = Config.read(junk)
+      assert {:error, told} = Nodes.Config.read(junk)
       assert told =~ "fleet of nodes"
     end
   end

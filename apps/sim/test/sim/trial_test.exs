@@ -36,16 +36,16 @@ defmodule Sim.TrialTest do
       leader = Sim.Trial.RunLog.leader(trial.run_log)
       reports = trial.members[leader].runner.mission.round.reports
       assert map_size(reports) == 6
-      assert reports[leader].found
+      assert reports[leader].merit
 
       assert Enum.all?(reports, fn {_id, report} ->
-               report.size_ppm <= reports[leader].size_ppm
+               report.merit == nil or report.merit <= reports[leader].merit
              end)
 
       assert [%{size_ppm: size}] =
                for(%{stage: :elected} = s <- Trial.result(trial).stages, do: s)
 
-      assert size == reports[leader].size_ppm
+      assert size == reports[leader].merit
     end
   end
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Camera do
   @moduledoc """
-  What a robot's camera sees, for people, as JPEG (R103).
+  Describes what a robot's camera sees, for people, as JPEG (R103).
 
       {:ok, jpeg} = Swarm.Camera.snapshot(:mag1)
       File.write!("mag1.jpg", jpeg)

@@ -28,8 +28,8 @@ defmodule Swarm.Comms do
   """
   use GenServer
   alias Hal.{Event, HardenedServer, Ticker}
-  alias Robot.Mission.Letter
-  alias Robot.{Board, Config, Names}
+  alias Robot.Mission.{Claim, Letter}
+  alias Robot.{Board, Names}
   alias Robot.Control.Pilot
   alias Mesh.Nonblocking
   alias Swarm.{EStop, Message, Replacement}
@@ -51,8 +51,8 @@ defmodule Swarm.Comms do
   Adds to the config of a robot a comms process, through which its mission sends messages, and an
   e-stop process, which its gate notifies of its latch.
   """
-  @spec join(Config.t(), keyword()) :: Config.t()
-  def join(%Config{} = config, options \\ []) do
+  @spec join(Robot.Config.t(), keyword()) :: Robot.Config.t()
+  def join(%Robot.Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
     # The e-stop process first: a companion that is listed later restarts with those before it,
     # but never restarts them.
@@ -71,8 +71,8 @@ defmodule Swarm.Comms do
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
 
   @doc "Starts the comms process of a robot, as its supervisor does."
-  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
-  def start_link(%Config{} = config, options) do
+  @spec start_link(Robot.Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config, options) do
     HardenedServer.start_link(__MODULE__, {config, options},
       name: Names.via(config.id, :comms),
       spawn_opt: [message_queue_data: :off_heap]
@@ -84,8 +84,10 @@ defmodule Swarm.Comms do
   `:all` those that are known here (`Swarm.Transport.robots/0`). It waits for nobody, and
   nobody confirms the message.
   """
-  @spec say(robot :: atom(), to :: atom() | [atom()] | :all, Message.t() | Letter.t()) :: [atom()]
+  @spec say(robot :: atom(), to, Message.t() | Letter.t() | Claim.t()) :: [atom()]
+        when to: atom() | [atom()] | :all
   def say(robot, to, %Letter{} = letter), do: say(robot, to, Message.new(robot, :mission, letter))
+  def say(robot, to, %Claim{} = claim), do: say(robot, to, Message.new(robot, :claim, claim))
 
   def say(robot, to, message) do
     ids = List.delete(addressed(to), robot)
@@ -105,7 +107,7 @@ defmodule Swarm.Comms do
     do: GenServer.cast(Names.via(robot, :comms), {:rival, other, nil})
 
   @impl GenServer
-  def init({%Config{id: id} = config, options}) do
+  def init({%Robot.Config{id: id} = config, options}) do
     board = Board.find!(id)
     boot = options[:boot] || System.system_time(:millisecond)
     transport = options[:transport] || {Transport, :transmit, []}
@@ -120,7 +122,7 @@ defmodule Swarm.Comms do
       name: NameClaim.new(id, {boot, node()}),
       unseen: 0,
       noted: nil,
-      ticker: Config.ticker(config, :tick, @tick_ms)
+      ticker: Robot.Config.ticker(config, :tick, @tick_ms)
     }
 
     EStop.present(id, true)
@@ -144,7 +146,7 @@ defmodule Swarm.Comms do
   end
 
   def handle_cast({:hear, term}, s) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     {heard, receiver} = Receiver.hear(s.receiver, term, at_ms)
     {:noreply, %{s | receiver: receiver} |> heard(heard, at_ms) |> relieve()}
   end
@@ -167,7 +169,7 @@ defmodule Swarm.Comms do
 
   def handle_cast({:rival, {boot, node} = other, comms}, s)
       when is_integer(boot) and is_atom(node) and (is_pid(comms) or comms == nil) do
-    case NameClaim.rival(s.name, other, comms, Config.now(s.config)) do
+    case NameClaim.rival(s.name, other, comms, Robot.Config.now(s.config)) do
       {false, name} -> {:noreply, %{s | name: name}}
       {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
     end
@@ -176,7 +178,7 @@ defmodule Swarm.Comms do
   def handle_cast(_unknown, s), do: {:noreply, reject(s)}
 
   @impl GenServer
-  def handle_info(:tick, s), do: {:noreply, s |> tick(Config.now(s.config)) |> schedule()}
+  def handle_info(:tick, s), do: {:noreply, s |> tick(Robot.Config.now(s.config)) |> schedule()}
 
   # The time for the drive's answer is over.
   def handle_info({:unanswered, ref, answer}, s) when is_reference(ref) do

@@ -30,7 +30,7 @@ defmodule Swarm.EStop do
   `Swarm.EStop.Actions`.
   """
   alias Hal.HardenedServer
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Swarm.EStop
   alias Swarm.Membership.Heartbeat
 
@@ -41,8 +41,8 @@ defmodule Swarm.EStop do
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
 
   @doc "Starts the e-stop process of a robot, as its supervisor does."
-  @spec start_link(Config.t(), keyword()) :: GenServer.on_start()
-  def start_link(%Config{} = config, _options) do
+  @spec start_link(Robot.Config.t(), keyword()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config, _options) do
     HardenedServer.start_link(EStop.Server, config,
       name: Names.via(config.id, :estop),
       spawn_opt: [priority: :high, message_queue_data: :off_heap]

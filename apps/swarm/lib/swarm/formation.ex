@@ -3,7 +3,7 @@ defmodule Swarm.Formation do
   The places of robots in a formation, relative to the leader. Pure; metres and radians.
 
   A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not in
-  the list. Slots have the leader's heading, except in a `:circle`, where all face the landmark.
+  the list. Slots have the leader's heading, except in a `:circle`, where all face its centre.
 
   | kind | slots |
   |---|---|
@@ -12,7 +12,7 @@ defmodule Swarm.Formation do
   | `:wedge` | a V of 90 degrees, the leader at its tip |
   | `:triangle` | filled rows of 1, 2, 3, … |
   | `:diamond` | rows of 1, 2, …, m, …, 2, 1 |
-  | `:circle` | a ring of all robots around the landmark, the leader at its own bearing |
+  | `:circle` | a ring of all robots, the leader among them, around a point ahead of the leader |
 
   A build may add kinds of its own, each a `Swarm.Formation.Kind`, which its configuration names. All robots of a fleet
   must have the same ones.
@@ -26,7 +26,7 @@ defmodule Swarm.Formation do
   @least_spacing 0.8
   @spacing {:number, @least_spacing, 5.0, "m"}
   @metres {:number, 0.0, 1_000.0, "m"}
-  # The minimum radius of a ring: robots at that distance still see all of the landmark.
+  # The minimum radius of a ring: robots at that distance still see all of what stands in its centre.
   @least_ring 1.6
 
   @typedoc "One of the built-in kinds, or one that the build adds."
@@ -128,8 +128,8 @@ defmodule Swarm.Formation do
   def least_spacing, do: @least_spacing
 
   @doc """
-  The slots of the followers of a group of `robots`, in the leader's frame. A circle needs the
-  distance of the landmark ahead of the leader.
+  The slots of the followers of a group of `robots`, in the leader's frame. A circle needs to know
+  how far ahead of the leader its centre is, in metres.
 
       iex> Swarm.Formation.slots({:column, 1.5}, 3)
       [Hal.Pose.new(-1.5, 0), Hal.Pose.new(-3, 0)]
@@ -139,7 +139,7 @@ defmodule Swarm.Formation do
       []
   """
   @spec slots(t(), pos_integer(), float()) :: [Pose.t()]
-  def slots(formation, robots, landmark_distance \\ @least_ring)
+  def slots(formation, robots, distance \\ @least_ring)
 
   def slots(formation, robots, distance),
     do: for(k <- 1..(robots - 1)//1, do: slot_of(formation, k, robots, distance))
@@ -153,7 +153,7 @@ defmodule Swarm.Formation do
   @spec slot_of(t(), rank :: pos_integer(), pos_integer(), float()) :: Pose.t()
   def slot_of({:circle, _spacing} = formation, k, robots, distance) do
     radius = ring(formation, robots)
-    # Seen from the landmark the leader is at angle pi.
+    # Seen from the centre the leader is at angle pi.
     angle = :math.pi() + 2 * :math.pi() * k / robots
 
     Pose.new(
@@ -166,7 +166,7 @@ defmodule Swarm.Formation do
   def slot_of({kind, d}, k, robots, _distance), do: kind |> slot(k, robots) |> scale(d)
 
   @doc """
-  The radius of the ring of `robots` around the landmark, the leader included.
+  The radius of the ring of `robots`, the leader included.
 
       iex> Swarm.Formation.ring({:circle, 1.0}, 12) |> Float.round(3)
       1.932

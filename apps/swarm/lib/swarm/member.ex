@@ -18,7 +18,7 @@ defmodule Swarm.Member do
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mission, Percept}
   alias Robot.Control.Controller
-  alias Robot.Mission.{Letter, Manual, Runner}
+  alias Robot.Mission.{Claim, Letter, Manual, Runner}
   alias Robot.Safety.Reflex
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
@@ -306,6 +306,9 @@ defmodule Swarm.Member do
 
   defp carry_out_one({:send, to, %Letter{} = letter}, member),
     do: {[{:send, to, Message.new(member.id, :mission, letter)}], member}
+
+  defp carry_out_one({:send, to, %Claim{} = claim}, member),
+    do: {[{:send, to, Message.new(member.id, :claim, claim)}], member}
 
   defp carry_out_one(effect, member), do: {[effect], member}
 

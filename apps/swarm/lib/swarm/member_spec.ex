@@ -8,7 +8,6 @@ defmodule Swarm.MemberSpec do
       {:ok, _pid} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
   """
   alias Hal.Options.{Type, Wording}
-  alias Robot.Config
   alias Robot.File.Terms
   alias Swarm.{Comms, Missions}
 
@@ -75,7 +74,7 @@ defmodule Swarm.MemberSpec do
     do: Type.read({:keys, [{:mission, mission} | table]}, named ++ options)
 
   @doc "The configuration that the robot is started with; an error is one line."
-  @spec config(Robot.File.t()) :: {:ok, Config.t()} | {:error, line :: String.t()}
+  @spec config(Robot.File.t()) :: {:ok, Robot.Config.t()} | {:error, line :: String.t()}
   def config(%Robot.File{} = file) do
     with {:ok, mission} <- mission(file.policies),
          {:ok, config} <- Robot.File.config(file) do

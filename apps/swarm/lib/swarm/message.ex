@@ -11,14 +11,13 @@ defmodule Swarm.Message do
   |---|---|
   | `:heartbeat` | `Swarm.Membership.Heartbeat` |
   | `:round` | one `Swarm.Agreement.Round` letter |
-  | `:place` | `Swarm.Formation.Reference`: a parent tells its child where the leader is supposed to be |
+  | `:claim` | `Robot.Mission.Claim`, as in heartbeats, for some robots only: it travels faster than those, or farther |
   | `:mission` | `Robot.Mission.Letter`, a message of a mission's own; the mission's table checks what it says |
   | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Comms.Forwarder`) |
 
   `hops` counts the robots that have passed a message on, at most three.
   """
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
   alias Swarm.Wire
 
@@ -27,11 +26,16 @@ defmodule Swarm.Message do
   @enforce_keys [:from, :kind, :body]
   defstruct @enforce_keys ++ [hops: 0]
 
-  @type kind :: :heartbeat | :round | :place | :mission | :relay
+  @type kind :: :heartbeat | :round | :claim | :mission | :relay
   @type t :: %__MODULE__{
           from: atom(),
           kind: kind(),
-          body: Heartbeat.t() | Round.Letter.t() | Reference.t() | Robot.Mission.Letter.t() | t(),
+          body:
+            Heartbeat.t()
+            | Round.Letter.t()
+            | Robot.Mission.Claim.t()
+            | Robot.Mission.Letter.t()
+            | t(),
           hops: 0..3
         }
 
@@ -45,7 +49,11 @@ defmodule Swarm.Message do
   @spec new(
           atom(),
           kind(),
-          Heartbeat.t() | Round.Letter.t() | Reference.t() | Robot.Mission.Letter.t() | t()
+          Heartbeat.t()
+          | Round.Letter.t()
+          | Robot.Mission.Claim.t()
+          | Robot.Mission.Letter.t()
+          | t()
         ) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
 
@@ -77,7 +85,7 @@ defmodule Swarm.Message do
   def check(term, known_view \\ [])
 
   def check(%__MODULE__{from: from, kind: kind, body: body} = message, view)
-      when kind in [:heartbeat, :round, :place, :mission, :relay] do
+      when kind in [:heartbeat, :round, :claim, :mission, :relay] do
     cond do
       not (Wire.whole?(message, __MODULE__) and Wire.name?(from)) ->
         {:error, :not_a_message}
@@ -99,7 +107,13 @@ defmodule Swarm.Message do
     do: with(:error <- Heartbeat.check(body), do: false)
 
   defp body(:round, body, view), do: Round.Letter.valid?(body, view) && {:ok, body}
-  defp body(:place, body, _view), do: Reference.valid?(body) && {:ok, body}
+
+  defp body(:claim, body, _view) do
+    with {:ok, %{} = claim} <- Robot.Mission.Claim.check(body),
+         do: {:ok, claim},
+         else: (_malformed_or_unknown -> false)
+  end
+
   defp body(:mission, body, _view), do: Robot.Mission.Letter.valid?(body) && {:ok, body}
 
   # Nothing else is passed on, and nothing is wrapped twice.

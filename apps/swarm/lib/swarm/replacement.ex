@@ -15,7 +15,7 @@ defmodule Swarm.Replacement do
   code. On real robots it is off unless their file says `replace: true`.
   """
   alias Hal.Options.Wording
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Swarm.{Missions, Replacement}
   alias Swarm.Replacement.Order
 
@@ -80,15 +80,15 @@ defmodule Swarm.Replacement do
     do: GenServer.cast(Replacement.Server, {:take, robot, request, stamp, ref})
 
   @doc "Writes on the robot's board what its config says; called by its comms process at its start."
-  @spec present(Config.t(), Board.t()) :: :ok
+  @spec present(Robot.Config.t(), Board.t()) :: :ok
   def present(config, board) do
     about = %{mission: config.mission, replace: config.replace}
-    :ok = Board.put(board, :comms, :release, about, Config.now(config))
+    :ok = Board.put(board, :comms, :release, about, Robot.Config.now(config))
     if config.replace, do: GenServer.cast(Replacement.Server, :keep), else: :ok
   end
 
   @doc "The config with the mission that was put in the place of its own, if any."
-  @spec config(Config.t(), Board.t()) :: Config.t()
+  @spec config(Robot.Config.t(), Board.t()) :: Robot.Config.t()
   def config(config, board) do
     case Board.fetch(board, :replaced, :infinity) do
       {:ok, %{mission: {_module, _options} = mission}, _at_ms} -> %{config | mission: mission}

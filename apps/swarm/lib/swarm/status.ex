@@ -46,7 +46,7 @@ defmodule Swarm.Status do
   """
   alias Hal.Device.Words
   alias Hal.{Odometry, Pose, Twist}
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Robot.Safety.LivenessMonitor
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
@@ -125,12 +125,12 @@ defmodule Swarm.Status do
         }
 
   @doc "The status of a robot of this node, from its board and its receiver."
-  @spec of(Config.t(), Board.t(), Receiver.t()) :: t()
+  @spec of(Robot.Config.t(), Board.t(), Receiver.t()) :: t()
   def of(config, board, receiver) do
     entries = Board.entries(board)
     driving = value(entries, :driving)
     mission = value(entries, :mission)
-    now_ms = Config.now(config)
+    now_ms = Robot.Config.now(config)
     health = for {{:health, device}, {condition, _age}} <- entries, do: {device, condition}
 
     %__MODULE__{

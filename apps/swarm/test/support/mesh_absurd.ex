@@ -5,7 +5,6 @@ defmodule Swarm.MeshNodes.Absurd do
   """
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
 
   @doc """
@@ -52,21 +51,10 @@ defmodule Swarm.MeshNodes.Absurd do
   end
 
   defp bodies(me) do
-    anchor = %Reference{
-      leader: me,
-      epoch: 1,
-      sequence: 1,
-      pose: {0, 0, 0},
-      twist: {0, 0},
-      formation: {:column, 1.0},
-      order: [],
-      size: 1,
-      places: []
-    }
-
+    claim = %Robot.Mission.Claim{mission: Some.Mission, version: 1, fields: %{}}
     letter = %Round.Letter{id: {1, 1, me}, view: [me], remaining_ms: 900, purpose: :search}
     beat = %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
-    [heartbeat: beat, round: letter, place: anchor]
+    [heartbeat: beat, round: letter, claim: claim]
   end
 
   defp spoilt(%module{} = body) do

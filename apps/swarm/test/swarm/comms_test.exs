@@ -296,7 +296,7 @@ defmodule Swarm.CommsTest do
 
   test "messages go by a transport from the options" do
     id = talking(:comms11, comms: [transport: {__MODULE__, :carry, [self()]}])
-    Comms.say(id, [:mag7, :comms11], Message.new(id, :place, :start))
+    Comms.say(id, [:mag7, :comms11], Message.new(id, :claim, :start))
     assert_receive {:carried, ^id, [:mag7], %Message{body: :start}}
     assert_receive {:carried, ^id, _all, %Message{kind: :heartbeat}}
   end
@@ -306,7 +306,7 @@ defmodule Swarm.CommsTest do
 
   test "say returns the addressees" do
     ids = for id <- [:comms12, :comms13, :comms14], do: talking(id)
-    message = Message.new(:comms12, :place, :start)
+    message = Message.new(:comms12, :claim, :start)
     all = Comms.say(:comms12, :all, message)
     assert all -- ids == all -- [:comms13, :comms14]
     assert Comms.say(:comms12, :comms13, message) == [:comms13]

@@ -3,7 +3,6 @@ defmodule Swarm.MessageTest do
   use ExUnit.Case, async: true
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Swarm.Membership.Heartbeat
   alias Swarm.Message.{Checked, Receiver}
   doctest Swarm.EStop.State
@@ -17,17 +16,6 @@ defmodule Swarm.MessageTest do
 
   @beat %Heartbeat{boot: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}}
   @claim %Robot.Mission.Claim{mission: Some.Mission, version: 1, fields: %{}}
-  @anchor %Reference{
-    leader: :mag1,
-    epoch: 1,
-    sequence: 1,
-    pose: {0, 0, 0},
-    twist: {0, 0},
-    formation: {:column, 1.0},
-    order: [:mag2],
-    size: 2,
-    places: [1]
-  }
   @letter %Round.Letter{id: {1, 1, :mag1}, view: [:mag1], remaining_ms: 10, purpose: :search}
 
   test "a message is checked once a node, and only what this node has marked is believed" do
@@ -69,17 +57,16 @@ defmodule Swarm.MessageTest do
       %{size_ppm: :x, distance: nil},
       %{size_ppm: 1, distance: -1},
       %{:a => 1, 2 => 3},
-      %{found: 1, size_ppm: 0, pose: nil},
+      %{merit: 1, pose: nil},
       %{mag1: %{}},
       self(),
       make_ref(),
       fn -> 1 end,
       %{__struct__: Heartbeat},
-      %{__struct__: Reference},
       %{__struct__: :nothing},
       <<1::3>>,
       @beat,
-      @anchor
+      @claim
     ])
   end
 
@@ -89,7 +76,7 @@ defmodule Swarm.MessageTest do
         Enum.random(
           heartbeat: @beat,
           heartbeat: %{@beat | claim: @claim},
-          place: @anchor,
+          claim: @claim,
           round: @letter
         )
 
@@ -140,13 +127,12 @@ defmodule Swarm.MessageTest do
     many = List.duplicate(1, 1_000_000)
     names = List.duplicate(:mag1, 1_001)
     large = :binary.copy("x", 1_000_000)
-    report = %{found: true, size_ppm: 1, pose: {0, 0, 0}, led: 0, of: 0}
+    report = %{merit: 1, pose: {0, 0, 0}, led: 0, of: 0}
 
     for {kind, body} <- [
-          place: %{@anchor | places: many},
-          place: %{@anchor | order: names, places: Enum.to_list(1..1_001), size: 1_000},
-          place: %{@anchor | epoch: Integer.pow(10, 1_000)},
-          place: %{@anchor | leader: nil},
+          claim: @claim,
+          claim: nil,
+          claim: %{@claim | fields: large},
           heartbeat: %{@beat | heard: <<0, large::binary, 0>>},
           heartbeat: %{@beat | heard: [:mag1]},
           heartbeat: %{@beat | sequence: Integer.pow(10, 1_000)},

@@ -1,6 +1,6 @@
 defmodule Vision.Detections do
   @moduledoc """
-  What a detector found in one frame of a camera, and how that frame was taken. This one struct
+  Holds what a detector found in one frame of a camera, and how that frame was taken. This one struct
   goes from the detector (`Vision.BlobDetector`, or a camera that detects by itself) through the
   robot's blackboard into the percept of its behaviours and its mission.
 

@@ -1,8 +1,7 @@
 defmodule Bench.Explore.Main do
-  @moduledoc "The command `mix bench explore`: reads its options, measures, prints the table."
-  alias Bench.Explore
-  alias Console.Cli
-  alias Console.Cli.{Format, MapName, Output, Parse, Progress}
+  @moduledoc "Runs the command `mix bench explore`: reads its options, measures, prints the table."
+  alias Bench.{Command, Explore}
+  alias Console.Cli.{Format, Output, Parse, Progress}
 
   @maps ~w(hall openplan offices)
   @fleets [1, 4]
@@ -10,12 +9,7 @@ defmodule Bench.Explore.Main do
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "explore", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -112,12 +106,9 @@ defmodule Bench.Explore.Main do
   defp table do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one run each (1-5)"},
-      {"maps", "NAME,NAME", &MapName.list/1,
-       "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(#{Enum.join(@maps, ",")})"},
+      Command.maps(@maps),
       {"duration", "S", &Parse.whole(&1, 1..100_000), "simulated seconds at most (#{@limit_s})"},
       {"help", nil, nil, "this text"}
     ]
   end
-
-  defp help, do: IO.puts("  mix bench explore [options]\n\n#{Cli.Arguments.help(table())}")
 end

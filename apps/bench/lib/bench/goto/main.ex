@@ -1,19 +1,13 @@
 defmodule Bench.Goto.Main do
-  @moduledoc "The command `mix bench goto`: reads its options, measures, prints the table."
-  alias Bench.{Goto, Table}
-  alias Console.Cli
-  alias Console.Cli.{Format, MapName, Output, Parse, Progress}
+  @moduledoc "Runs the command `mix bench goto`: reads its options, measures, prints the table."
+  alias Bench.{Command, Goto, Table}
+  alias Console.Cli.{Format, Output, Parse, Progress}
 
   @maps ~w(offices hospital clinic lab cave ring doorway openplan)
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "goto", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -110,11 +104,8 @@ defmodule Bench.Goto.Main do
   defp table do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one draw each (1-50)"},
-      {"maps", "NAME,NAME", &MapName.list/1,
-       "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(#{Enum.join(@maps, ",")})"},
+      Command.maps(@maps),
       {"help", nil, nil, "this text"}
     ]
   end
-
-  defp help, do: IO.puts("  mix bench goto [options]\n\n#{Cli.Arguments.help(table())}")
 end

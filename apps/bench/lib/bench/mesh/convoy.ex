@@ -1,9 +1,9 @@
 defmodule Bench.Mesh.Convoy do
   @moduledoc """
-  What runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
+  Describes what runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
   the measurement, in the node that asks. Called over standard input.
   """
-  alias Bench.Mesh.{Agent, IdleDrive, Watch}
+  alias Bench.Mesh.{IdleDrive, Watch}
   alias Agents.{Conversation, Envelope}
   alias Swarm.{Commands, Directory}
 
@@ -29,7 +29,9 @@ defmodule Bench.Mesh.Convoy do
         profile: Hal.Profile.magellan(),
         drive: {IdleDrive, []},
         trace: {__MODULE__, :trace, counted},
-        companions: [{Agents.Responder, service: Agent.service(), module: Agent}]
+        companions: [
+          {Agents.Responder, service: Bench.Mesh.Agent.service(), module: Bench.Mesh.Agent}
+        ]
       )
 
     {:ok, _robot} = Robot.Fleet.start_robot(Robot.Fleet, Swarm.Comms.join(config))
@@ -70,7 +72,7 @@ defmodule Bench.Mesh.Convoy do
   def rounds(robots, count), do: asks(robots, {:round, robots}, count)
 
   defp asks(robots, content, count) do
-    peers = for id <- robots, do: {id, Agent.service()}
+    peers = for id <- robots, do: {id, Bench.Mesh.Agent.service()}
 
     repeat(count, fn ->
       question = Envelope.new(:query, :base, content)

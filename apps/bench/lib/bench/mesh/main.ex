@@ -1,17 +1,12 @@
 defmodule Bench.Mesh.Main do
-  @moduledoc "The command `mix bench swarm`: reads its options, measures, prints the table."
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench swarm`: reads its options, measures, prints the table."
   alias Console.Cli.{Output, Parse}
-  alias Bench.{Load, Mesh}
+  alias Bench.{Command, Load, Mesh}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments),
+    do: Command.run(arguments, "swarm", table(), &measure/1, Command.cases(Mesh.cases()))
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -62,12 +57,5 @@ defmodule Bench.Mesh.Main do
     if Enum.all?(numbers, &match?({:ok, _}, &1)),
       do: {:ok, for({:ok, number} <- numbers, do: number)},
       else: {:error, "whole numbers from 2 to 100, with commas between"}
-  end
-
-  defp help do
-    cases =
-      Enum.map_join(Mesh.cases(), "\n", &"  #{String.pad_trailing("#{&1.name}", 10)}#{&1.says}")
-
-    IO.puts("  mix bench swarm [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
   end
 end

@@ -1,19 +1,13 @@
 defmodule Bench.Page.Main do
-  @moduledoc "The command `mix bench page`: reads its options, measures, prints the table."
-  alias Bench.{Load, Page}
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench page`: reads its options, measures, prints the table."
+  alias Bench.{Command, Load, Page}
   alias Console.Cli.{Output, Parse}
 
   @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "page", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -45,13 +39,5 @@ defmodule Bench.Page.Main do
       {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp help do
-    IO.puts("""
-      mix bench page [options]
-
-    #{Cli.Arguments.help(table())}
-    """)
   end
 end

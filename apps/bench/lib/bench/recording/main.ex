@@ -1,17 +1,11 @@
 defmodule Bench.Recording.Main do
-  @moduledoc "The command `mix bench recording`: reads its options, measures, prints the table."
-  alias Bench.{Load, Recording}
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench recording`: reads its options, measures, prints the table."
+  alias Bench.{Command, Load, Recording}
   alias Console.Cli.{Output, Parse, Progress}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "recording", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -94,6 +88,4 @@ defmodule Bench.Recording.Main do
       {"help", nil, nil, "this text"}
     ]
   end
-
-  defp help, do: IO.puts("  mix bench recording [options]\n\n#{Cli.Arguments.help(table())}")
 end

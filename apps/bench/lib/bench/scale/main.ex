@@ -1,17 +1,11 @@
 defmodule Bench.Scale.Main do
-  @moduledoc "The command `mix bench scale`: reads its options, measures, prints table and bars."
-  alias Bench.{Load, Scale}
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench scale`: reads its options, measures, prints table and bars."
+  alias Bench.{Command, Load, Scale}
   alias Console.Cli.{Output, Parse, Progress}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "scale", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -52,6 +46,4 @@ defmodule Bench.Scale.Main do
       {"help", nil, nil, "this text"}
     ]
   end
-
-  defp help, do: IO.puts("  mix bench scale [options]\n\n#{Cli.Arguments.help(table())}")
 end

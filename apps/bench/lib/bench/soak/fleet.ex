@@ -4,7 +4,8 @@ defmodule Bench.Soak.Fleet do
   (`Bench.Soak.Fleet.Keeper`). The robots stand abreast before the landmark. The first has the real drivers of a
   Magellan, on emulated devices behind serial lines, so that there are port programs to be left behind.
   """
-  alias Bench.Soak.Fleet.{Keeper, Network, Node}
+  alias Bench.Soak.Fleet
+  alias Bench.Soak.Fleet.{Keeper, Network}
   alias Bench.Soak.WorldHost
   alias Hal.Pose
   alias Sim.Trial.Setup
@@ -82,7 +83,7 @@ defmodule Bench.Soak.Fleet do
 
     main = fn vm ->
       start = start(fleet, robot, if(hardware?, do: :zero, else: :on))
-      Vm.call(vm, Node, :main, [Map.put(about, :start, start)], @boot_ms)
+      Vm.call(vm, Fleet.Node, :main, [Map.put(about, :start, start)], @boot_ms)
     end
 
     %{name: robot, options: Network.vm(network, robot), main: main}

@@ -1,6 +1,6 @@
 defmodule Bench.Soak.Links do
   @moduledoc """
-  Who reaches whom in a run of `bin/soak`, and since when, by what was done to them. Pure; times in microseconds.
+  Records who reaches whom in a run of `bin/soak`, and since when, by what was done to them. Pure; times in microseconds.
 
   A robot is here while its node is up and not frozen. What is done to a robot that is here may keep it from
   hearing and speaking for a while: then it counts as here from a later time on (`touch/3`).

@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Main do
-  @moduledoc "The command `bin/soak`: reads its arguments, runs, prints the table."
+  @moduledoc "Runs the command `bin/soak`: reads its arguments, runs, prints the table."
   alias Bench.Soak.{Report, Runner, State}
   alias Console.Cli.{Output, Progress}
 

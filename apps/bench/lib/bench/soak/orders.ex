@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Orders do
-  @moduledoc "What people would order while a run of `bin/soak` goes on, given on nodes that may be about to end."
+  @moduledoc "Gives what people would order while a run of `bin/soak` goes on, given on nodes that may be about to end."
   alias Bench.Soak.{Recorder, State}
 
   @order_ms 8_000

@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Report do
-  @moduledoc "What `bin/soak` prints of a run, as text. Pure."
+  @moduledoc "Writes what `bin/soak` prints of a run, as text. Pure."
   alias Bench.Soak.{Journal, Schedule, State}
 
   @doc "One line on how it stands."

@@ -1,6 +1,6 @@
 defmodule Bench.Soak.Schedule do
   @moduledoc """
-  What `bin/soak` does to a fleet and when, as a function of the seed. Pure: the same arguments give the same
+  Draws what `bin/soak` does to a fleet and when, as a function of the seed. Pure: the same arguments give the same
   list, so a run can be repeated.
 
   A run is a sequence of cycles of 75 s. In its first 45 s processes, nodes and the world are killed, nodes are

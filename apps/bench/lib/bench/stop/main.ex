@@ -1,17 +1,12 @@
 defmodule Bench.Stop.Main do
-  @moduledoc "The command `mix bench stop`: reads its options, measures, prints the table."
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench stop`: reads its options, measures, prints the table."
   alias Console.Cli.{Output, Parse}
-  alias Bench.{Load, Stop}
+  alias Bench.{Command, Load, Stop}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments),
+    do: Command.run(arguments, "stop", table(), &measure/1, Command.cases(Stop.cases()))
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -51,12 +46,5 @@ defmodule Bench.Stop.Main do
       {"json", "FILE", &{:ok, &1}, "write the figures there too, in milliseconds"},
       {"help", nil, nil, "this text"}
     ]
-  end
-
-  defp help do
-    cases =
-      Enum.map_join(Stop.cases(), "\n", &"  #{String.pad_trailing("#{&1.name}", 10)}#{&1.says}")
-
-    IO.puts("  mix bench stop [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
   end
 end

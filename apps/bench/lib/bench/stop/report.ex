@@ -1,5 +1,5 @@
 defmodule Bench.Stop.Report do
-  @moduledoc "What `mix bench stop` measured, as a table in Markdown and as a term for JSON. Pure."
+  @moduledoc "Shows what `mix bench stop` measured, as a table in Markdown and as a term for JSON. Pure."
   alias Bench.Stop
   alias Bench.Table
   alias Console.Cli.Format

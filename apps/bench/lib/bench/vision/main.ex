@@ -1,17 +1,11 @@
 defmodule Bench.Vision.Main do
-  @moduledoc "The command `mix bench vision`: reads its options, measures, prints the table."
-  alias Bench.{Load, Vision}
-  alias Console.Cli
+  @moduledoc "Runs the command `mix bench vision`: reads its options, measures, prints the table."
+  alias Bench.{Command, Load, Vision}
   alias Console.Cli.{Output, Parse, Progress}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
-  def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      given = Map.new(pairs)
-      if given["help"], do: help(), else: measure(given)
-    end
-  end
+  def run(arguments), do: Command.run(arguments, "vision", table(), &measure/1)
 
   defp measure(given) do
     output = Output.to(:stderr)
@@ -105,6 +99,4 @@ defmodule Bench.Vision.Main do
       path -> {:ok, path}
     end
   end
-
-  defp help, do: IO.puts("  mix bench vision [options]\n\n#{Cli.Arguments.help(table())}")
 end

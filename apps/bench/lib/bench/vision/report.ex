@@ -1,6 +1,6 @@
 defmodule Bench.Vision.Report do
   @moduledoc """
-  What `mix bench vision` measured, as a table in Markdown and as a term for JSON. Pure. Ratios are
+  Shows what `mix bench vision` measured, as a table in Markdown and as a term for JSON. Pure. Ratios are
   to the kernel; each is the median of the rounds' ratios.
   """
   alias Bench.{Table, Vision}

@@ -6,7 +6,7 @@ defmodule Bench.Vision.Runner do
 
   A round's figure is the median of its frames. Times are microseconds.
   """
-  alias Bench.Vision.{Beside, Kernel}
+  alias Bench.Vision.Beside
   alias Vision.Backend.Native
 
   @slow_each 4
@@ -65,14 +65,16 @@ defmodule Bench.Vision.Runner do
 
   # What measures a way once, or why it cannot be measured.
   defp search(:copy, _program, %{work: work}),
-    do: kernel(fn -> %{timed(fn -> Kernel.copy(work.copies) end) | faults: nil} end)
+    do: kernel(fn -> %{timed(fn -> Bench.Vision.Kernel.copy(work.copies) end) | faults: nil} end)
 
   defp search(:kernel, _program, %{work: %{colours: colours} = work}) do
     [%{width: width, height: height} | _] = work.frames
 
     kernel(fn ->
       timed(fn ->
-        found = Kernel.find(work.copies, width, height, colours.tables, colours.min_area)
+        found =
+          Bench.Vision.Kernel.find(work.copies, width, height, colours.tables, colours.min_area)
+
         Enum.map(found, &elem(&1, 0))
       end)
     end)
@@ -97,7 +99,7 @@ defmodule Bench.Vision.Runner do
     end
   end
 
-  defp kernel(search), do: if(Kernel.loaded?(), do: search, else: "not built")
+  defp kernel(search), do: if(Bench.Vision.Kernel.loaded?(), do: search, else: "not built")
 
   defp backend(backend, work) do
     if Code.ensure_loaded?(backend) and backend.reads?(:yuyv),

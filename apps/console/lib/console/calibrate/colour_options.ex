@@ -1,6 +1,6 @@
 defmodule Console.Calibrate.ColourOptions do
   @moduledoc """
-  The command line of `mix calibrate colour`: turns its arguments into a checked map or error
+  Reads the command line of `mix calibrate colour`: turns its arguments into a checked map or error
   lines. Pure.
   """
   alias Console.Cli

@@ -1,5 +1,5 @@
 defmodule Console.Chaos.Report do
-  @moduledoc "What `mix chaos` prints and writes of its runs. Pure."
+  @moduledoc "Writes what `mix chaos` prints and writes of its runs. Pure."
   alias Console.Cli.Format
   alias Sim.Chaos.{Invariants, Runner, Violation}
 

@@ -1,6 +1,6 @@
 defmodule Console.Live.Pace do
   @moduledoc """
-  How fast a run in lockstep goes, as a person wants it: at a multiple of real time, as fast as it
+  Describes how fast a run in lockstep goes, as a person wants it: at a multiple of real time, as fast as it
   goes, paused, or a few steps at a time. Pure; the time is an input, in ms.
 
   What is said of the speed was measured, over the last two seconds: a machine that is too slow

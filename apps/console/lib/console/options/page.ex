@@ -1,7 +1,7 @@
 defmodule Console.Options.Page do
-  @moduledoc "Where a page is served: the options of the commands that have one. Pure."
+  @moduledoc "Decides where a page is served: the options of the commands that have one. Pure."
+  alias Console.Page
   alias Console.Cli.Parse
-  alias Console.Page.Access
 
   @doc "The rows for `Console.Cli.Arguments`."
   @spec table() :: [Console.Cli.Arguments.option()]
@@ -23,7 +23,7 @@ defmodule Console.Options.Page do
   @doc "Who reaches the page may move robots: beyond this machine it needs a token."
   @spec check(:inet.ip_address(), String.t() | nil) :: :ok | {:error, line :: String.t()}
   def check(address, token) do
-    if token != nil or Access.loopback?(address),
+    if token != nil or Page.Access.loopback?(address),
       do: :ok,
       else:
         {:error,

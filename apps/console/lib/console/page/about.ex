@@ -1,6 +1,6 @@
 defmodule Console.Page.About do
   @moduledoc """
-  What a robot knows and does, for the page: who wished, what the gate limits, its way, its devices, what its sonars and its
+  Describes what a robot knows and does, for the page: who wished, what the gate limits, its way, its devices, what its sonars and its
   camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
   """
   alias Hal.{Json, Odometry, Pose}

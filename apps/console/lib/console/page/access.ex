@@ -1,6 +1,6 @@
 defmodule Console.Page.Access do
   @moduledoc """
-  Who may look at the page and command by it. Pure.
+  Decides who may look at the page and command by it. Pure.
 
   A browser that shows a page of strangers may be made to call this one. It says then where it comes from (`Origin`), and
   by which name it was sent here (`Host`): a name that somebody else has given an address of this machine is not taken.

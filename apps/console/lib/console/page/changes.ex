@@ -1,6 +1,6 @@
 defmodule Console.Page.Changes do
   @moduledoc """
-  What each robot of a fleet did, one line for each change of its state from scene to scene, and what the fleet tells of
+  Records what each robot of a fleet did, one line for each change of its state from scene to scene, and what the fleet tells of
   it. Pure.
 
   A mesh tells such lines itself (`Console.Live.Mesh.View`).

@@ -5,7 +5,8 @@ defmodule Console.Page.Request do
   """
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
-  alias Console.Page.{About, Access, Client, Feed, State}
+  alias Console.Page
+  alias Console.Page.{About, Client, Feed, State}
   alias Console.Prompt
 
   @folder Path.expand("../../../priv/page", __DIR__)
@@ -42,7 +43,7 @@ defmodule Console.Page.Request do
     path = request |> get(:path) |> List.to_string()
 
     with "GET" <- request |> get(:method) |> to_string(),
-         :ok <- Access.check(asked(request), page.token) do
+         :ok <- Page.Access.check(asked(request), page.token) do
       serve(path, request, page)
     else
       {status, line} -> say(request, status, line)

@@ -1,5 +1,5 @@
 defmodule Console.Page.State do
-  @moduledoc "What the page is told of a fleet, as JSON. Pure; metres and radians, to millimetres and milliradians."
+  @moduledoc "Describes what the page is told of a fleet, as JSON. Pure; metres and radians, to millimetres and milliradians."
   alias Console.Cli.Format
   alias Console.Picture.Floorplan
   alias Hal.Json

@@ -1,6 +1,6 @@
 defmodule Console.Picture.RunTrack do
   @moduledoc """
-  What a run records for its picture: each robot's path, and the formation error over time. Pure.
+  Collects what a run records for its picture: each robot's path, and the formation error over time. Pure.
 
   A path gets a new point when its robot has moved by 2 cm, so that long waits cost nothing.
   """

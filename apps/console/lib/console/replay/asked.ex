@@ -1,5 +1,5 @@
 defmodule Console.Replay.Asked do
-  @moduledoc "Whether a recording has what the options of `mix replay` ask for. Pure."
+  @moduledoc "Decides whether a recording has what the options of `mix replay` ask for. Pure."
   alias Console.Cli.Format
   alias Console.Replay.Options
   alias Hal.Options.Suggest

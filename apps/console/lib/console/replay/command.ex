@@ -1,5 +1,5 @@
 defmodule Console.Replay.Command do
-  @moduledoc "What a person types in `mix replay FILE --step`. Pure."
+  @moduledoc "Reads what a person types in `mix replay FILE --step`. Pure."
   alias Console.Cli.{Arguments, Parse}
   alias Hal.Options.Suggest
 

@@ -1,5 +1,5 @@
 defmodule Console.Replay.Difference do
-  @moduledoc "Where a replay differs from its recording, or one recording from another, for people. Pure."
+  @moduledoc "Finds where a replay differs from its recording, or one recording from another, for people. Pure."
   alias Console.Cli.Format
 
   @doc "A difference of a replay (`t:Sim.Replay.difference/0`), line by line."

@@ -3,10 +3,10 @@ defmodule Console.Replay.Live do
   Replays a recording of robots of processes (`Robot.Recorder`) for people: whether they decide
   the same again, how they were at a time, and why.
   """
+  alias Robot.Recording
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Replay.{LiveText, Options}
   alias Hal.Options.Suggest
-  alias Robot.Recording.File
   alias Robot.Replay
 
   @progress_ms 100
@@ -21,13 +21,13 @@ defmodule Console.Replay.Live do
   def run(%Options{} = options) do
     Sim.Recording.File.know()
 
-    with {:ok, file} <- File.open(options.file),
+    with {:ok, file} <- Recording.File.open(options.file),
          :ok <- check(options, file),
          do: {:live, replay(options, file)}
   end
 
   defp check(options, file) do
-    names = Enum.map(File.ids(file), &Atom.to_string/1)
+    names = Enum.map(Recording.File.ids(file), &Atom.to_string/1)
     last_s = (file.end_ms - file.start_ms) / 1000
 
     with :ok <- only_lockstep(options),
@@ -74,7 +74,7 @@ defmodule Console.Replay.Live do
 
     run =
       file
-      |> File.entries(until)
+      |> Recording.File.entries(until)
       |> Stream.filter(&asked?(&1, options.robot))
       |> Enum.reduce(
         %{
@@ -108,7 +108,7 @@ defmodule Console.Replay.Live do
 
   defp step({id, {_role, _kind, _what, at_ms}} = entry, run) do
     {replay, difference} = Replay.step(run.replay, entry)
-    last_ms = max(run.last_ms, File.since_start_ms(run.file, id, at_ms))
+    last_ms = max(run.last_ms, Recording.File.since_start_ms(run.file, id, at_ms))
     draw(note(%{run | replay: replay, last_ms: last_ms}, difference))
   end
 

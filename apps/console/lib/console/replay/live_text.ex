@@ -1,16 +1,16 @@
 defmodule Console.Replay.LiveText do
-  @moduledoc "What `mix replay` says of a recording of robots of processes, line by line. Pure."
+  @moduledoc "Describes what `mix replay` says of a recording of robots of processes, line by line. Pure."
+  alias Robot.Recording
   alias Console.Cli.Format
   alias Console.Replay.{Options, Why}
   alias Hal.{Pose, Twist}
   alias Robot.Mission.Runner
-  alias Robot.Recording.File
   alias Robot.Replay
 
   @doc "The first line: what the file has."
-  @spec heading(File.t()) :: String.t()
-  def heading(%File{} = file) do
-    ids = File.ids(file)
+  @spec heading(Recording.File.t()) :: String.t()
+  def heading(%Recording.File{} = file) do
+    ids = Recording.File.ids(file)
     {:ok, began} = DateTime.from_unix(div(file.start_ms, 1000))
 
     "#{file.path}: #{Format.count(length(ids), "live robot")} (#{Enum.join(ids, ", ")}), " <>
@@ -19,13 +19,16 @@ defmodule Console.Replay.LiveText do
   end
 
   @doc "How the robots stood at the end of the replay, at this second, and why, as the options ask."
-  @spec moment(Options.t(), File.t(), Replay.t(), at_s :: number()) :: [String.t()]
+  @spec moment(Options.t(), Recording.File.t(), Replay.t(), at_s :: number()) :: [String.t()]
   def moment(options, file, replay, at_s) do
-    ids = for id <- File.ids(file), options.robot in [nil, Atom.to_string(id)], do: id
+    ids = for id <- Recording.File.ids(file), options.robot in [nil, Atom.to_string(id)], do: id
     shown = if options.at_s || options.robot, do: Enum.map(ids, &stood(replay, &1)), else: []
 
     shown ++
-      for id <- File.ids(file), "#{id}" == options.why, line <- why(replay, id, at_s), do: line
+      for id <- Recording.File.ids(file),
+          "#{id}" == options.why,
+          line <- why(replay, id, at_s),
+          do: line
   end
 
   defp stood(replay, id) do
@@ -80,7 +83,13 @@ defmodule Console.Replay.LiveText do
   end
 
   @doc "What came of the comparison; `shown` are the first of `count` differences."
-  @spec verdict(File.t(), Replay.t(), non_neg_integer(), [Replay.difference()], non_neg_integer()) ::
+  @spec verdict(
+          Recording.File.t(),
+          Replay.t(),
+          non_neg_integer(),
+          [Replay.difference()],
+          non_neg_integer()
+        ) ::
           [String.t()]
   def verdict(file, replay, last_ms, shown, count) do
     counts = Replay.counts(replay)
@@ -152,7 +161,7 @@ defmodule Console.Replay.LiveText do
   defp sum(counts, what), do: counts |> Enum.map(fn {_key, all} -> all[what] end) |> Enum.sum()
 
   defp difference(file, difference) do
-    at_s = File.since_start_ms(file, difference.robot, difference.at_ms) / 1000
+    at_s = Recording.File.since_start_ms(file, difference.robot, difference.at_ms) / 1000
 
     [
       "#{Format.decimals(at_s, 2)} s #{difference.robot}, #{difference.role}, on #{brief(difference.input)}",

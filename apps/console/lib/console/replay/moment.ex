@@ -1,5 +1,5 @@
 defmodule Console.Replay.Moment do
-  @moduledoc "How the fleet of a replay stood at its last tick, and why a robot did what it did. Pure."
+  @moduledoc "Describes how the fleet of a replay stood at its last tick, and why a robot did what it did. Pure."
   alias Console.Cli.Format
   alias Console.Replay.{Options, Why}
   alias Sim.{Replay, Trial}

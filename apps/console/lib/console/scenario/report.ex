@@ -1,5 +1,5 @@
 defmodule Console.Scenario.Report do
-  @moduledoc "What `mix scenario` prints about a run, as lines. Pure."
+  @moduledoc "Writes what `mix scenario` prints about a run, as lines. Pure."
   alias Console.Cli.Format
   alias Console.Fleet
   alias Sim.Scenario

@@ -1,6 +1,6 @@
 defmodule Hal.Device.Lifecycle do
   @moduledoc """
-  What a device does with its driver: opens it, reopens it after a failure, judges its signs of
+  Describes what a device does with its driver: opens it, reopens it after a failure, judges its signs of
   life, arms and drives the wheels. Runs in the device's process.
   """
   alias Hal.Twist

@@ -1,6 +1,6 @@
 defmodule Hal.Device.Server do
   @moduledoc """
-  The process of a device (`Hal.Device`): it receives messages and decides the order of the work,
+  Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
   which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
   """
   use GenServer

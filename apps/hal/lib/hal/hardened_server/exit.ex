@@ -1,6 +1,6 @@
 defmodule Hal.HardenedServer.Exit do
   @moduledoc """
-  How the process of a `Hal.HardenedServer` ends: it calls the module's `terminate/2`, reports the
+  Describes how the process of a `Hal.HardenedServer` ends: it calls the module's `terminate/2`, reports the
   reason as `GenServer` does, unless it is an ordinary one, and exits with it.
   """
 

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Schedule do
   @moduledoc """
-  When a driver does its periodic tasks next: `due` has the times, in milliseconds. Pure.
+  Decides when a driver does its periodic tasks next: `due` has the times, in milliseconds. Pure.
   """
   alias Hal.RFlex.Driver
 

@@ -1,5 +1,5 @@
 defmodule Mcap.FileWriter.Disk do
-  @moduledoc "What `Mcap.FileWriter.Output` does with files; the error is one line that names the file."
+  @moduledoc "Describes what `Mcap.FileWriter.Output` does with files; the error is one line that names the file."
 
   @type result :: :ok | {:error, line :: String.t()}
 

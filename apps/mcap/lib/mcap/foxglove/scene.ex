@@ -1,6 +1,6 @@
 defmodule Mcap.Foxglove.Scene do
   @moduledoc """
-  What a `foxglove.SceneUpdate` shows: entities made of simple bodies. Pure.
+  Describes what a `foxglove.SceneUpdate` shows: entities made of simple bodies. Pure.
 
       body = Mcap.Foxglove.Scene.cylinder(pose, {0.4, 0.4, 0.3}, {0.2, 0.4, 1.0})
       robot = Mcap.Foxglove.Scene.entity(ns, "map", "mag1", [body])

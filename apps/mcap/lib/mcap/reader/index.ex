@@ -1,5 +1,5 @@
 defmodule Mcap.Reader.Index do
-  @moduledoc "What the summary at the end of a whole file tells, or `:error`: then the file is scanned (`Mcap.Reader.Scan`)."
+  @moduledoc "Describes what the summary at the end of a whole file tells, or `:error`: then the file is scanned (`Mcap.Reader.Scan`)."
   alias Mcap.Reader.{Chunk, Source}
   alias Mcap.Record.Parse
 

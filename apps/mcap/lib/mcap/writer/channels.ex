@@ -1,6 +1,6 @@
 defmodule Mcap.Writer.Channels do
   @moduledoc "The channels and schemas that a writer has: their ids, counted from 1, and their records. Pure."
-  alias Mcap.{Channel, Record}
+  alias Mcap.Channel
 
   defstruct ids: %{}, schema_ids: %{}, records: %{}
 
@@ -34,8 +34,8 @@ defmodule Mcap.Writer.Channels do
     # Binaries, because chunk after chunk repeats them.
     record = {
       schema_id,
-      if(schema, do: IO.iodata_to_binary(Record.schema(schema_id, schema)), else: ""),
-      IO.iodata_to_binary(Record.channel(channel, schema_id))
+      if(schema, do: IO.iodata_to_binary(Mcap.Record.schema(schema_id, schema)), else: ""),
+      IO.iodata_to_binary(Mcap.Record.channel(channel, schema_id))
     }
 
     {ids, records} = {Map.put(channels.ids, key, id), Map.put(channels.records, id, record)}

@@ -4,7 +4,6 @@ defmodule Mcap.Writer.Chunk do
 
   It holds the schema and the channel of its messages itself, so that a whole chunk can be read alone.
   """
-  alias Mcap.Record
 
   defstruct records: [],
             bytes: 0,
@@ -39,7 +38,10 @@ defmodule Mcap.Writer.Chunk do
 
     %{
       chunk
-      | records: [chunk.records, Record.message_head(id, before + count, time_ns, bytes) | data],
+      | records: [
+          chunk.records,
+          Mcap.Record.message_head(id, before + count, time_ns, bytes) | data
+        ],
         bytes: chunk.bytes + 31 + bytes,
         # `nil`, an atom, is above all numbers.
         start_ns: min(chunk.start_ns, time_ns),
@@ -72,14 +74,14 @@ defmodule Mcap.Writer.Chunk do
   def close(chunk, offset) do
     records = IO.iodata_to_binary(chunk.records)
     crc = :erlang.crc32(records)
-    head = Record.chunk_head(chunk.start_ns, chunk.end_ns, chunk.bytes, crc)
+    head = Mcap.Record.chunk_head(chunk.start_ns, chunk.end_ns, chunk.bytes, crc)
     length = byte_size(head) + chunk.bytes
 
     {indexes, {places, behind}} =
       chunk.index
       |> Enum.sort()
       |> Enum.map_reduce({[], offset + length}, fn {id, {_count, entries}}, {places, place} ->
-        index = Record.message_index(id, Enum.reverse(entries))
+        index = Mcap.Record.message_index(id, Enum.reverse(entries))
         {index, {[{id, place} | places], place + IO.iodata_length(index)}}
       end)
 

@@ -1,6 +1,5 @@
 defmodule Mcap.Writer.Summary do
-  @moduledoc "What a writer remembers of what it wrote, and the end of the file that is made of it. Pure."
-  alias Mcap.Record
+  @moduledoc "Remembers what a writer wrote, and the end of the file that is made of it. Pure."
 
   defstruct counts: %{}, start_ns: nil, end_ns: nil, chunks: {0, []}, metadata: {0, []}, bytes: 0
 
@@ -21,7 +20,7 @@ defmodule Mcap.Writer.Summary do
   @doc "Adds a chunk that was written."
   @spec add_chunk(t(), map()) :: t()
   def add_chunk(summary, index) do
-    record = IO.iodata_to_binary(Record.chunk_index(index))
+    record = IO.iodata_to_binary(Mcap.Record.chunk_index(index))
     {n, records} = summary.chunks
 
     %{
@@ -37,7 +36,7 @@ defmodule Mcap.Writer.Summary do
   @doc "Adds a note that was written at this place, with this length."
   @spec add_metadata(t(), String.t(), non_neg_integer(), pos_integer()) :: t()
   def add_metadata(summary, name, offset, length) do
-    record = IO.iodata_to_binary(Record.metadata_index(offset, length, name))
+    record = IO.iodata_to_binary(Mcap.Record.metadata_index(offset, length, name))
     {n, records} = summary.metadata
     bytes = summary.bytes + byte_size(record)
     %{summary | metadata: {n + 1, [record | records]}, bytes: bytes}
@@ -54,7 +53,7 @@ defmodule Mcap.Writer.Summary do
 
     {offsets, behind} =
       Enum.map_reduce(groups, start, fn {opcode, length, _records}, place ->
-        {Record.summary_offset(opcode, place, length), place + length}
+        {Mcap.Record.summary_offset(opcode, place, length), place + length}
       end)
 
     {offsets, offsets_start} = if offsets?, do: {offsets, behind}, else: {[], 0}
@@ -101,7 +100,7 @@ defmodule Mcap.Writer.Summary do
     [
       {0x03, for({_id, record} <- schemas, do: record)},
       {0x04, for({_id, {_schema_id, _schema, record}} <- used, do: record)},
-      {0x0B, Record.statistics(statistics)},
+      {0x0B, Mcap.Record.statistics(statistics)},
       {0x08, Enum.reverse(chunk_indexes)},
       {0x0D, Enum.reverse(metadata_indexes)}
     ]

@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.Access do
   @moduledoc """
-  Which addresses may open a distribution connection. It is asked before anything is read from one, because OTP's
+  Decides which addresses may open a distribution connection. It is asked before anything is read from one, because OTP's
   handshake makes an atom of the name that a caller gives before it asks for the cookie.
 
   | address | may connect |

@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.CallingAddress do
   @moduledoc """
-  Where this node calls others from.
+  Finds where this node calls others from.
 
   - A node that listens on one address only, or has an interface, calls from there, since that is where others hear it.
   - A shell of a release (`-mesh_shell true`, `rel/remote.vm.args.eex`) that root has started calls from a reserved port,

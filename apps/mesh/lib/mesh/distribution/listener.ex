@@ -8,7 +8,8 @@ defmodule Mesh.Distribution.Listener do
   OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
   From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
   """
-  alias Mesh.Distribution.{Access, Epmd, Preload}
+  alias Mesh.Distribution
+  alias Mesh.Distribution.{Epmd, Preload}
   alias Mesh.Distribution.Access.{Networks, Refusals}
   alias Mesh.Interface
 
@@ -24,7 +25,7 @@ defmodule Mesh.Distribution.Listener do
     peers = for {_node, ip, _port} <- Epmd.Peers.parse(environment(~c"CONVOY_PEERS")), do: ip
     allowed = String.split(environment(~c"CONVOY_ALLOW"), [",", " "], trim: true)
 
-    Access.open(
+    Distribution.Access.open(
       Interface.of_environment(),
       for(text <- peers ++ allowed, {:ok, network} <- [Networks.read(text)], do: network)
     )
@@ -39,7 +40,7 @@ defmodule Mesh.Distribution.Listener do
     with [name, host] <- :string.split(Atom.to_charlist(node), ~c"@"),
          answer when elem(answer, 0) == :ok <-
            :net_kernel.epmd_module().address_please(name, host, :inet) do
-      not Access.there?() or Access.reachable?(elem(answer, 1), now())
+      not Distribution.Access.there?() or Distribution.Access.reachable?(elem(answer, 1), now())
     else
       _unknown -> false
     end
@@ -77,7 +78,7 @@ defmodule Mesh.Distribution.Listener do
     with {:ok, message} <- :inet_tcp.recv(socket, length, ms) do
       name = name(message)
 
-      if name == nil or ok?(socket, &Access.name(name, &1, &2, &3)),
+      if name == nil or ok?(socket, &Distribution.Access.name(name, &1, &2, &3)),
         do: {:ok, message},
         else: {:error, :closed}
     end
@@ -95,7 +96,7 @@ defmodule Mesh.Distribution.Listener do
   defp accept_next(listening, before) do
     case :inet_tcp.accept(listening) do
       {:ok, socket} ->
-        if ok?(socket, &Access.check/3) do
+        if ok?(socket, &Distribution.Access.check/3) do
           _ = before && Process.flag(:priority, before)
           {:ok, socket}
         else

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Admission do
   @moduledoc """
-  What becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
+  Describes what becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
   Pure.
 
   It is refused if it comes from an address that its sender does not name as its own: somebody has
@@ -8,7 +8,6 @@ defmodule Mesh.Protocol.Admission do
   (`Mesh.Protocol.Challenge`). Terms of the services that the consumer accepts late, such as a
   stop, are taken in both cases, if the session was once accepted.
   """
-  alias Mesh.Protocol
   alias Mesh.Protocol.{Beacon, NodeTable, Outbox, Packet, Rejections, Roster}
   alias Mesh.Protocol.Packet.ReplayProtection
 
@@ -19,13 +18,13 @@ defmodule Mesh.Protocol.Admission do
 
   @doc "Takes a packet that the filter has read, if it was made now; or counts why not."
   @spec admit(
-          Protocol.t(),
+          Mesh.Protocol.t(),
           Packet.t(),
           node(),
           Packet.Filter.body(),
-          Protocol.address(),
+          Mesh.Protocol.address(),
           integer()
-        ) :: {Protocol.t(), [Protocol.effect()]}
+        ) :: {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def admit(protocol, packet, node, body, address, now_ms) do
     if address in packet.addresses,
       do: judge(protocol, packet, node, body, address, now_ms),
@@ -33,7 +32,7 @@ defmodule Mesh.Protocol.Admission do
   end
 
   @doc "Time: forgets whom it challenged a while ago."
-  @spec tick(Protocol.t(), integer()) :: Protocol.t()
+  @spec tick(Mesh.Protocol.t(), integer()) :: Mesh.Protocol.t()
   def tick(protocol, now_ms) do
     lately = fn {_whom, at_ms} -> now_ms - at_ms < @challenge_ms end
     %{protocol | challenged: Map.filter(protocol.challenged, lately)}

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Beacon do
   @moduledoc """
-  What a node says about itself: the nodes that it hears and their addresses, the nodes that its
+  Describes what a node says about itself: the nodes that it hears and their addresses, the nodes that its
   distribution is connected to, and the port that the distribution listens on (0: ask epmd). Names
   are text. Pure.
   """

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Challenge do
   @moduledoc """
-  How a node learns that another speaks now, and how its clock stands (`Mesh.Protocol.ClockOffset`).
+  Describes how a node learns that another speaks now, and how its clock stands (`Mesh.Protocol.ClockOffset`).
   Pure.
 
   A challenge is a signed datagram, and so carries its sender's session and time; a node answers

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.ClockOffset do
   @moduledoc """
-  How another node's monotonic clock stands to this one's, and so how old its datagrams are. Pure;
+  Estimates how another node's monotonic clock stands to this one's, and so how old its datagrams are. Pure;
   times are in ms.
 
   Monotonic clocks start anywhere and say nothing about the time of day. So a node challenges the

@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.NodeTable do
   @moduledoc """
-  What a node knows about the others: their addresses, when they were heard, the nodes that they
+  Records what a node knows about the others: their addresses, when they were heard, the nodes that they
   hear and are connected to, and the robots that they hold. Pure; times are this node's own, in
   ms.
 

@@ -1,14 +1,13 @@
 defmodule Mesh.Protocol.Outbox do
   @moduledoc """
-  What a node sends: signed datagrams, each with the next number of its session, the time and its
+  Describes what a node sends: signed datagrams, each with the next number of its session, the time and its
   own addresses. Pure.
   """
-  alias Mesh.Protocol
   alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Rejections}
 
   @doc "A beacon for these addresses: who is heard here, and who is connected."
-  @spec beacon(Protocol.t(), integer(), [Protocol.address()]) ::
-          {Protocol.t(), [Protocol.effect()]}
+  @spec beacon(Mesh.Protocol.t(), integer(), [Mesh.Protocol.address()]) ::
+          {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def beacon(protocol, _now_ms, []), do: {protocol, []}
 
   def beacon(protocol, now_ms, addresses) do
@@ -25,12 +24,12 @@ defmodule Mesh.Protocol.Outbox do
   A challenge, or only an answer, for these addresses; `echo` is the challenge that it answers.
   """
   @spec clock(
-          Protocol.t(),
+          Mesh.Protocol.t(),
           :challenge | :answer,
           Challenge.echo() | nil,
-          [Protocol.address()],
+          [Mesh.Protocol.address()],
           integer()
-        ) :: {Protocol.t(), [Protocol.effect()]}
+        ) :: {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def clock(protocol, _kind, _echo, [], _now_ms), do: {protocol, []}
 
   def clock(protocol, kind, echo, addresses, now_ms) do
@@ -42,8 +41,14 @@ defmodule Mesh.Protocol.Outbox do
   A term for these addresses. It is sealed once: who hears it twice, by multicast and by name,
   counts it once. What is too large for a datagram is counted as rejected.
   """
-  @spec seal(Protocol.t(), :beacon | :message | :service, term(), [Protocol.address()], integer()) ::
-          {Protocol.t(), [Protocol.effect()]}
+  @spec seal(
+          Mesh.Protocol.t(),
+          :beacon | :message | :service,
+          term(),
+          [Mesh.Protocol.address()],
+          integer()
+        ) ::
+          {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def seal(protocol, _kind, _term, [], _now_ms), do: {protocol, []}
 
   def seal(protocol, kind, term, addresses, now_ms) do

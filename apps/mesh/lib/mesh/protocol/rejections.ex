@@ -3,7 +3,6 @@ defmodule Mesh.Protocol.Rejections do
   Counts what a node refuses, by reason, and in each second what nobody of the fleet has sent, by
   which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
   """
-  alias Mesh.Protocol
   alias Mesh.Protocol.Packet
   alias Mesh.Protocol.Packet.ReplayProtection
 
@@ -11,7 +10,7 @@ defmodule Mesh.Protocol.Rejections do
   @strange [:unsigned, :not_ours, :version, :foreign]
 
   @doc "Time: each second begins to count anew what nobody of the fleet has sent."
-  @spec tick(Protocol.t(), integer()) :: Protocol.t()
+  @spec tick(Mesh.Protocol.t(), integer()) :: Mesh.Protocol.t()
   def tick(protocol, now_ms), do: count(protocol, div(now_ms, 1_000))
 
   defp count(%{second: second} = protocol, second), do: protocol
@@ -24,13 +23,13 @@ defmodule Mesh.Protocol.Rejections do
   tenth, the hundredth, so that an attacker does not fill the log.
   """
   @spec reject(
-          Protocol.t(),
+          Mesh.Protocol.t(),
           Packet.Filter.refusal()
           | ReplayProtection.refusal()
           | {:foreign, String.t()}
           | :too_big,
-          Protocol.address() | nil
-        ) :: {Protocol.t(), [Protocol.effect()]}
+          Mesh.Protocol.address() | nil
+        ) :: {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def reject(protocol, {reason, name}, address) do
     {protocol, effects} = reject(protocol, reason, address)
 
@@ -46,7 +45,7 @@ defmodule Mesh.Protocol.Rejections do
   end
 
   @doc "Counts a datagram of a session that is not known: anybody may have recorded it."
-  @spec strange(Protocol.t()) :: Protocol.t()
+  @spec strange(Mesh.Protocol.t()) :: Mesh.Protocol.t()
   def strange(protocol), do: %{protocol | strange: protocol.strange + 1}
 
   defp told?(:unknown_node, count), do: rem(count, 100) == 1

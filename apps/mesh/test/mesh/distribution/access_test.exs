@@ -1,7 +1,8 @@
 defmodule Mesh.Distribution.AccessTest do
   # The tables have names.
   use ExUnit.Case, async: false
-  alias Mesh.Distribution.{Access, Listener}
+  alias Mesh.Distribution
+  alias Mesh.Distribution.Listener
   alias Mesh.Distribution.Access.{Bucket, Networks, Refusals}
   @moduletag :capture_log
   doctest Bucket
@@ -14,7 +15,7 @@ defmodule Mesh.Distribution.AccessTest do
 
   setup do
     :ok = Refusals.open()
-    :ok = Access.open({0, 0, 0, 0}, [])
+    :ok = Distribution.Access.open({0, 0, 0, 0}, [])
   end
 
   defp networks(texts) do
@@ -25,27 +26,27 @@ defmodule Mesh.Distribution.AccessTest do
   end
 
   # From a port that anybody may open.
-  defp check(ip, called, ms), do: Access.check({ip, 1_024}, called, ms)
-  defp name(name, ip, called, ms), do: Access.name(name, {ip, 1_024}, called, ms)
+  defp check(ip, called, ms), do: Distribution.Access.check({ip, 1_024}, called, ms)
+  defp name(name, ip, called, ms), do: Distribution.Access.name(name, {ip, 1_024}, called, ms)
 
   test "only this machine may call, until addresses are heard or configured" do
     assert check({127, 0, 0, 1}, {127, 0, 0, 1}, 0) == :ok
     assert check(@own, @own, 0) == :ok
     assert check(@fellow, @own, 0) == {:error, :stranger}
-    :ok = Access.heard([@fellow], 0)
+    :ok = Distribution.Access.heard([@fellow], 0)
     assert check(@fellow, @own, 1) == :ok
     assert check(@stranger, @own, 1) == {:error, :stranger}
     assert check({0, 0, 0, 0, 0, 0xFFFF, 0x0A00, 0x0002}, @own, 1) == {:error, :stranger}
-    :ok = Access.configure(networks(["10.0.0.64/28"]))
+    :ok = Distribution.Access.configure(networks(["10.0.0.64/28"]))
     assert check(@stranger, @own, 2) == :ok
-    :ok = Access.configure([])
+    :ok = Distribution.Access.configure([])
     assert check(@stranger, @own, 3) == {:error, :stranger}
   end
 
   test "with an interface, only who has called that, or the loopback, may connect" do
     for interface <- [@own, "no-card"] do
-      :ok = Access.open(interface, [])
-      :ok = Access.heard([@fellow], 0)
+      :ok = Distribution.Access.open(interface, [])
+      :ok = Distribution.Access.heard([@fellow], 0)
       there? = interface == @own
       assert check(@fellow, @own, 1) == :ok == there?
       assert check(@fellow, {10, 0, 1, 1}, 1) == {:error, :elsewhere}
@@ -57,21 +58,21 @@ defmodule Mesh.Distribution.AccessTest do
   end
 
   test "what the environment names stays, whatever the options say" do
-    :ok = Access.open({0, 0, 0, 0}, networks(["10.0.0.66"]))
-    :ok = Access.configure([])
+    :ok = Distribution.Access.open({0, 0, 0, 0}, networks(["10.0.0.66"]))
+    :ok = Distribution.Access.configure([])
     assert check(@stranger, @own, 0) == :ok
-    assert Access.reachable?(@stranger, 0)
-    refute Access.reachable?(@fellow, 0)
+    assert Distribution.Access.reachable?(@stranger, 0)
+    refute Distribution.Access.reachable?(@fellow, 0)
   end
 
   test "an address that is not heard for ten minutes is a stranger's again" do
-    :ok = Access.heard([@fellow], 0)
+    :ok = Distribution.Access.heard([@fellow], 0)
     assert check(@fellow, @own, 10 * @minutes - 1) == :ok
     assert check(@fellow, @own, 10 * @minutes) == {:error, :stranger}
   end
 
   test "each address may call 20 times at once, and ten times a second" do
-    :ok = Access.heard([@fellow], 0)
+    :ok = Distribution.Access.heard([@fellow], 0)
     attempts = fn ip, ms -> Enum.count(1..100, fn _ -> check(ip, @own, ms) == :ok end) end
     assert attempts.(@fellow, 0) == 20
     assert check(@fellow, @own, 0) == {:error, :too_often}
@@ -84,7 +85,7 @@ defmodule Mesh.Distribution.AccessTest do
   end
 
   test "this machine has one rate, whatever address it calls from, and a network has one" do
-    :ok = Access.configure(networks(["10.0.0.64/28", "10.0.0.20"]))
+    :ok = Distribution.Access.configure(networks(["10.0.0.64/28", "10.0.0.20"]))
     local = for n <- 1..100, do: check({127, 1, 2, n}, {127, 0, 0, 1}, 0)
     assert Enum.count(local, &(&1 == :ok)) == 20
     assert check(@own, @own, 0) == {:error, :too_often}
@@ -94,21 +95,25 @@ defmodule Mesh.Distribution.AccessTest do
   end
 
   test "root of this machine has a rate of its own, but not that of another" do
-    :ok = Access.heard([@fellow], 0)
+    :ok = Distribution.Access.heard([@fellow], 0)
     for ip <- [@own, @fellow], _ <- 1..100, do: check(ip, @own, 0)
     for n <- 1..100, do: name(~c"not-root-#{n}@nowhere", @own, @own, 0)
-    root = fn ip -> Enum.count(1..100, &(Access.check({ip, 511 + &1}, @own, 0) == :ok)) end
+
+    root = fn ip ->
+      Enum.count(1..100, &(Distribution.Access.check({ip, 511 + &1}, @own, 0) == :ok))
+    end
+
     assert root.(@own) == 20
     assert root.({127, 0, 0, 1}) == 0
     assert root.(@fellow) == 0
-    name = &Access.name(~c"root-#{&1}@nowhere", {@own, 1_023}, @own, 0)
+    name = &Distribution.Access.name(~c"root-#{&1}@nowhere", {@own, 1_023}, @own, 0)
     assert Enum.count(1..100, &(name.(&1) == :ok)) == 20
   end
 
   test "names that have no atom are few, and fewest from fellows' addresses" do
     others = for n <- 1..100, do: {10, 7, 0, n}
-    :ok = Access.heard(others, 0)
-    :ok = Access.configure(networks(["10.8.0.0/16"]))
+    :ok = Distribution.Access.heard(others, 0)
+    :ok = Distribution.Access.configure(networks(["10.8.0.0/16"]))
 
     new = fn ips, ms ->
       Enum.count(ips, &(name(~c"new-#{inspect(&1)}-#{ms}@nowhere", &1, @own, ms) == :ok))
@@ -117,7 +122,7 @@ defmodule Mesh.Distribution.AccessTest do
     assert new.(others, 0) == 20
     assert new.(for(n <- 1..100, do: {10, 8, 0, n}), 0) == 20
     assert new.(for(n <- 1..100, do: {127, 8, 0, n}), 0) == 20
-    :ok = Access.heard(others, @minutes)
+    :ok = Distribution.Access.heard(others, @minutes)
     assert new.(others, @minutes) == 1
     assert new.([{127, 0, 0, 1}], @minutes) == 1
     [fellow | _] = others
@@ -129,26 +134,26 @@ defmodule Mesh.Distribution.AccessTest do
   end
 
   test "the table is bounded, and what is out of date makes room" do
-    size = fn -> :ets.info(Access, :size) end
+    size = fn -> :ets.info(Distribution.Access, :size) end
     addresses = fn a, count -> for n <- 1..count, do: {10, a, div(n, 256), rem(n, 256)} end
-    :ok = Access.heard(addresses.(1, 10_000), 0)
+    :ok = Distribution.Access.heard(addresses.(1, 10_000), 0)
     assert size.() <= 10
-    :ok = Access.heard(addresses.(1, 3_000), 0)
+    :ok = Distribution.Access.heard(addresses.(1, 3_000), 0)
     for ip <- addresses.(1, 3_000), do: check(ip, @own, 0)
     assert size.() <= 4_096
     assert check({10, 1, 11, 184}, @own, 0) == {:error, :too_often}
     assert check({10, 1, 11, 184}, @own, @minutes) == :ok
-    :ok = Access.heard(addresses.(2, 4_000), 20 * @minutes)
+    :ok = Distribution.Access.heard(addresses.(2, 4_000), 20 * @minutes)
     assert check({10, 2, 0, 1}, @own, 20 * @minutes) == :ok
     assert size.() <= 4_096
   end
 
   test "without a table nobody is heard, and only this machine is known" do
-    :ets.delete(Access)
-    refute Access.there?()
-    assert Access.heard([@fellow], 0) == :ok
-    assert Access.configure([]) == :ok
-    refute Access.reachable?(@fellow, 0)
+    :ets.delete(Distribution.Access)
+    refute Distribution.Access.there?()
+    assert Distribution.Access.heard([@fellow], 0) == :ok
+    assert Distribution.Access.configure([]) == :ok
+    refute Distribution.Access.reachable?(@fellow, 0)
     assert check(@fellow, @own, 0) == {:error, :stranger}
   end
 

@@ -5,7 +5,8 @@ defmodule Mesh.Distribution.CarriersTest do
   """
   # Each node has a name and a port of its own.
   use ExUnit.Case, async: true
-  alias Mesh.Distribution.{Access, Certs, ConnectionLog, Listener, Preload, Tcp_dist, Tls_dist}
+  alias Mesh.Distribution
+  alias Mesh.Distribution.{Certs, ConnectionLog, Listener, Preload, Tcp_dist, Tls_dist}
   @moduletag :realtime
   @moduletag :tmp_dir
 
@@ -36,7 +37,7 @@ defmodule Mesh.Distribution.CarriersTest do
       assert Vm.call(third, Node, :connect, [second.node])
       assert Enum.sort(Vm.call(second, Node, :list, [])) == Enum.sort([first.node, third.node])
       assert Vm.call(second, :erpc, :call, [first.node, :erlang, :node, []]) == first.node
-      assert Vm.call(third, Access, :there?, []) == false
+      assert Vm.call(third, Distribution.Access, :there?, []) == false
 
       Vm.stop(third)
       assert Vm.call(second, Node, :disconnect, [first.node])
@@ -50,10 +51,10 @@ defmodule Mesh.Distribution.CarriersTest do
       node = node(port, ~w(-kernel net_setuptime 120) ++ flags)
       strange = :"strange@203.0.113.7"
       assert Vm.call(node, :net_kernel, :connect_node, [strange]) == false
-      refute Vm.call(node, Access, :reachable?, [@strange, 0])
+      refute Vm.call(node, Distribution.Access, :reachable?, [@strange, 0])
       now = Vm.call(node, System, :monotonic_time, [:millisecond])
-      :ok = Vm.call(node, Access, :heard, [[@strange], now])
-      assert Vm.call(node, Access, :reachable?, [@strange, now])
+      :ok = Vm.call(node, Distribution.Access, :heard, [[@strange], now])
+      assert Vm.call(node, Distribution.Access, :reachable?, [@strange, now])
     end
   end
 
@@ -114,7 +115,7 @@ defmodule Mesh.Distribution.CarriersTest do
       assert Vm.call(second, Node, :connect, [first.node])
       calls = for _ <- 1..(3 * @at_once), do: Task.async(fn -> say_hello(port, "x@y") end)
       Task.await_many(calls, 60_000)
-      assert %{too_often: refused} = Vm.call(first, Access.Refusals, :counts, [])
+      assert %{too_often: refused} = Vm.call(first, Distribution.Access.Refusals, :counts, [])
       assert refused > 0
       assert Vm.call(first, :code, :is_loaded, [Hal.Event])
       assert Vm.call(second, Node, :disconnect, [first.node])

@@ -1,6 +1,6 @@
 defmodule Mix.Tasks.Fleet.CertsTest do
   use Hal.TaskCase, async: false
-  alias Mix.Tasks.Fleet.Certs, as: Task
+  alias Mix.Tasks.Fleet.Certs, as: CertsTask
 
   unless System.find_executable("openssl"), do: @moduletag(skip: "openssl is missing")
 
@@ -8,13 +8,13 @@ defmodule Mix.Tasks.Fleet.CertsTest do
     out = Path.join(tmp, "certs")
     list = Path.join(tmp, "fleet")
     File.write!(list, "mag2 # the second\n\n# none\n")
-    Task.run(["mag1", "--fleet", list, "--out", out])
+    CertsTask.run(["mag1", "--fleet", list, "--out", out])
     assert said() == ["#{out}/ca.pem made", "#{out}/mag1 made", "#{out}/mag2 made"]
     before = File.read!("#{out}/mag1/key.pem")
-    Task.run(["mag1", "min1", "--out", out])
+    CertsTask.run(["mag1", "min1", "--out", out])
     assert said() == ["#{out}/ca.pem kept", "#{out}/mag1 kept", "#{out}/min1 made"]
     assert File.read!("#{out}/mag1/key.pem") == before
-    Task.run(["mag1", "--force", "--out", out])
+    CertsTask.run(["mag1", "--force", "--out", out])
     assert File.read!("#{out}/mag1/key.pem") != before
 
     for file <- ["ca-key.pem", "mag1/key.pem", "min1/key.pem"],
@@ -31,16 +31,16 @@ defmodule Mix.Tasks.Fleet.CertsTest do
   test "wrong words are one line, and nothing is made", %{tmp_dir: tmp} do
     out = Path.join(tmp, "certs")
 
-    assert refusal(Task, ["--out", out]) ==
+    assert refusal(CertsTask, ["--out", out]) ==
              "robots are missing: give their names, or --fleet FILE"
 
-    assert refusal(Task, ["--colour"]) == "--colour is not an option; --help lists them"
-    assert refusal(Task, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
-    assert refusal(Task, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
-    assert refusal(Task, ["--fleet", tmp]) =~ "is not a file of names"
+    assert refusal(CertsTask, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refusal(CertsTask, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
+    assert refusal(CertsTask, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"
+    assert refusal(CertsTask, ["--fleet", tmp]) =~ "is not a file of names"
     refute File.exists?(out)
     File.mkdir_p!(out)
     File.write!(Path.join(out, "ca.pem"), "")
-    assert refusal(Task, ["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
+    assert refusal(CertsTask, ["mag1", "--out", out]) =~ "has a ca.pem, but not its key"
   end
 end

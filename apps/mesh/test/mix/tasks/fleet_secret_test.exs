@@ -1,24 +1,24 @@
 defmodule Mix.Tasks.Fleet.SecretTest do
   use Hal.TaskCase, async: false
-  alias Mix.Tasks.Fleet.Secret, as: Task
+  alias Mix.Tasks.Fleet.Secret, as: SecretTask
 
   test "makes one, says its fingerprint, and keeps what is there", %{tmp_dir: folder} do
     path = Path.join(folder, "secret")
-    Task.run([path])
+    SecretTask.run([path])
     assert_received {:mix_shell, :info, [line]}
     {:ok, secret} = Mesh.Secret.load(path)
     assert line == "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
 
-    assert refusal(Task, [path]) =~ "exists already; --force overwrites it"
-    Task.run([path, "--force"])
+    assert refusal(SecretTask, [path]) =~ "exists already; --force overwrites it"
+    SecretTask.run([path, "--force"])
     assert {:ok, other} = Mesh.Secret.load(path)
     assert other.fingerprint != secret.fingerprint
   end
 
   test "wrong words are one line" do
-    assert refusal(Task, ["--colour"]) == "--colour is not an option; --help lists them"
-    assert refusal(Task, ["one", "two"]) == "one file, not 2: one two"
-    Task.run(["--help"])
+    assert refusal(SecretTask, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refusal(SecretTask, ["one", "two"]) == "one file, not 2: one two"
+    SecretTask.run(["--help"])
     assert_received {:mix_shell, :info, ["Creates the secret of a fleet" <> _rest]}
   end
 end

@@ -1,6 +1,6 @@
 defmodule Missions.Explore.Choice do
   @moduledoc """
-  Which frontier a robot goes to: the one with the least cost, where what others are going to see costs extra (Burgard, Moors,
+  Decides which frontier a robot goes to: the one with the least cost, where what others are going to see costs extra (Burgard, Moors,
   Stachniss and Schneider 2005, section III). Pure.
 
   Each tells to where it goes and how far that is for it. Of two that are after the same place, that with the shorter way has

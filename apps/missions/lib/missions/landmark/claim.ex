@@ -1,13 +1,13 @@
 defmodule Missions.Landmark.Claim do
   @moduledoc """
-  What a robot says of its landmark mission to all others, with its heartbeats (`Robot.Mission.Claim`). Pure.
+  Describes what a robot says of its landmark mission to all others, with its heartbeats (`Robot.Mission.Claim`). Pure.
 
   `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
   estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside
   it. `in_place` says that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
   does not get there, `formed` that all do. Only a leader has an `anchor`.
   """
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Swarm.Membership.Heartbeat
   alias Swarm.Wire
 
@@ -74,6 +74,27 @@ defmodule Missions.Landmark.Claim do
   end
 
   defp sight?(_other), do: false
+
+  @doc """
+  What a robot does, in one word for people, by the claim of its mission: its phase, or how a follower fares.
+
+      iex> for more <- [%{}, %{in_place: true}, %{unsure: true}, %{blocked: true}],
+      ...>   do: Missions.Landmark.Claim.state(Map.put(more, :phase, :follow))
+      [:follow, :in_place, :unsure, :blocked]
+      iex> Missions.Landmark.Claim.state(%{})
+      :idle
+  """
+  @spec state(map()) :: atom()
+  def state(%{blocked: true}), do: :blocked
+  def state(%{phase: :follow, in_place: true}), do: :in_place
+  def state(%{phase: :follow, unsure: true}), do: :unsure
+  def state(%{phase: phase}), do: phase
+  def state(_new), do: :idle
+
+  @doc "The size at which it sees the landmark, in millionths of its picture; `nil` if it does not see it."
+  @spec size(map()) :: non_neg_integer() | nil
+  def size(%{sight: %{size_ppm: size}}), do: size
+  def size(_blind), do: nil
 
   @doc """
   A leadership lapses after a second of silence: others may have elected another leader by then. An anchor is good for as long,

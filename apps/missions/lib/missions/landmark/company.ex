@@ -4,7 +4,7 @@ defmodule Missions.Landmark.Company do
   """
   alias Missions.Landmark.Claim
   alias Swarm.Membership.{Heartbeat, Peers}
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
 
   @enforce_keys [:beats, :view, :epochs, :leading_epoch, :anchored?]
   defstruct @enforce_keys

@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Explanation do
-  @moduledoc "What the landmark mission knows and has decided, for people who ask why. Pure."
+  @moduledoc "Tells what the landmark mission knows and has decided, for people who ask why. Pure."
   alias Missions.Landmark.State
   alias Swarm.Agreement.Round
 
@@ -49,10 +49,10 @@ defmodule Missions.Landmark.Explanation do
 
   defp report(nil, robot, %{me: robot, report: :busy}), do: "still looks around"
   defp report(nil, _robot, _round), do: "has not reported"
-  defp report(%{found: false} = report, _robot, _round), do: "found nothing#{led(report)}"
+  defp report(%{merit: nil} = report, _robot, _round), do: "found nothing#{led(report)}"
 
-  defp report(%{found: true} = report, _robot, _round),
-    do: "found it, #{share(report.size_ppm)}#{led(report)}"
+  defp report(report, _robot, _round),
+    do: "found it, #{share(report.merit)}#{led(report)}"
 
   defp led(%{led: 0}), do: ""
   defp led(%{led: count}), do: "; it leads #{count}"

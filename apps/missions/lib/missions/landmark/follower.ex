@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Follower do
   @moduledoc """
-  What a follower does: it drives to its slot, watches what it can correct its pose by, and passes
+  Decides what a follower does: it drives to its slot, watches what it can correct its pose by, and passes
   the reference on to its child. Pure.
 
   Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
@@ -10,11 +10,9 @@ defmodule Missions.Landmark.Follower do
   to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   """
   alias Hal.Pose
-  alias Robot.Behaviour
   alias Robot.Percept.CameraPointing
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Behaviour.Patience
-  alias Swarm.Message
   alias Swarm.Formation.Chain
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, LandmarkTrack, Marks, SlotPoses}
@@ -92,7 +90,7 @@ defmodule Missions.Landmark.Follower do
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
       {%{mission | follower: wait(mission.follower, age_ms)},
-       [{:goal, :stand, {Behaviour.Stop, []}}, {:look, look_out(mission)}]}
+       [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, look_out(mission)}]}
     else
       follow(mission, place, age_ms)
     end
@@ -140,7 +138,7 @@ defmodule Missions.Landmark.Follower do
 
     mission = %{mission | follower: mission |> block(slot, error) |> late(mission, slot, error)}
     options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
-    goal = {:goal, {:slot, mission.epoch}, {Behaviour.Follow, options}}
+    goal = {:goal, {:slot, mission.epoch}, {Robot.Behaviour.Follow, options}}
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
@@ -236,7 +234,7 @@ defmodule Missions.Landmark.Follower do
     child = Chain.child([anchor.leader | anchor.order], mission.me)
 
     if news != follower.told and child != nil,
-      do: {news, [{:send, [child], Message.new(mission.me, :place, anchor)}]},
+      do: {news, [{:claim, [child], %{anchor: anchor}}]},
       else: {follower.told, []}
   end
 

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.LandmarkTrack do
   @moduledoc """
-  What a robot knows about the landmark from its own camera: its apparent size, and its place (map
+  Tracks what a robot knows about the landmark from its own camera: its apparent size, and its place (map
   frame). Pure.
   """
   alias Hal.Pose

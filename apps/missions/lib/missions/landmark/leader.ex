@@ -1,12 +1,11 @@
 defmodule Missions.Landmark.Leader do
   @moduledoc """
-  What the leader does besides tracking the landmark: it announces where it is supposed to be
+  Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
   (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
   judges whether the shape is formed. Pure.
   """
-  alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Swarm.{Formation, Message}
+  alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
@@ -105,7 +104,7 @@ defmodule Missions.Landmark.Leader do
   defp blind(mission) do
     leadership = %{mission.leadership | formed?: false, good_ms: nil, bad_ms: nil}
     mission = %{mission | anchor: nil, leadership: leadership}
-    {mission, [{:goal, :stand, {Behaviour.Stop, []}}, {:look, 0.0}]}
+    {mission, [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, 0.0}]}
   end
 
   defp lead(mission) do
@@ -118,7 +117,7 @@ defmodule Missions.Landmark.Leader do
     place =
       if told == [],
         do: [],
-        else: [{:send, told, Message.new(mission.me, :place, mission.anchor)}]
+        else: [{:claim, told, %{anchor: mission.anchor}}]
 
     {mission,
      formed ++ lost ++ no_room ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
@@ -235,10 +234,10 @@ defmodule Missions.Landmark.Leader do
       {near, far} = range(mission)
       place = mission.sight && mission.sight.place
       options = [colour: mission.colour, near: near, far: far, place: place]
-      {:goal, {:track, mission.epoch}, {Behaviour.TrackBlob, options}}
+      {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
     else
       turn = div(mission.now_ms, 20_000)
-      {:goal, {:seek, mission.epoch, turn}, {Behaviour.FindBlob, [colour: mission.colour]}}
+      {:goal, {:seek, mission.epoch, turn}, {Robot.Behaviour.FindBlob, [colour: mission.colour]}}
     end
   end
 

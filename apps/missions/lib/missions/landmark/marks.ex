@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Marks do
   @moduledoc """
-  What a follower corrects its pose by: the leader's frame, the landmark at the place that the
+  Decides what a follower corrects its pose by: the leader's frame, the landmark at the place that the
   leader reports, and the robots ahead of it in the order at their reported places, each with its
   reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
 

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Policy do
   @moduledoc """
-  What a robot may do with the robots that it can reach. Pure.
+  Decides what a robot may do with the robots that it can reach. Pure.
 
   **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
   `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others
@@ -25,7 +25,7 @@ defmodule Missions.Landmark.Policy do
   to all. A robot that never met anybody cannot lose anybody.
   """
   alias Swarm.Agreement.Election
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Missions.Landmark
 
   # A heartbeat lists the robots that were heard in the last second.

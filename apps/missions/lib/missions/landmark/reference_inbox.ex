@@ -3,7 +3,7 @@ defmodule Missions.Landmark.ReferenceInbox do
   Decides whose reference a robot accepts, and when it joins a leader that lists it. Pure.
   """
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, EpochFilter, Policy}
 

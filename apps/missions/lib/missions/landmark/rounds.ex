@@ -106,7 +106,7 @@ defmodule Missions.Landmark.Rounds do
           mission
           | verdict: {:leader, leader},
             epoch: epoch,
-            size_ppm: record.reports[leader].size_ppm,
+            size_ppm: record.reports[leader].merit || 0,
             order: if(leader == mission.me, do: plan(mission, record.reports, leader), else: []),
             rescan?: false,
             anchor: nil,

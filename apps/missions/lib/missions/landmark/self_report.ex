@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.SelfReport do
   @moduledoc """
-  What a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
+  Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   """
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, Marks}

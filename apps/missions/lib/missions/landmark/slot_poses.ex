@@ -8,7 +8,7 @@ defmodule Missions.Landmark.SlotPoses do
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Formation
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
 
   @ahead_ms 500
   @default_distance 1.2
@@ -39,6 +39,25 @@ defmodule Missions.Landmark.SlotPoses do
   @spec landmark(Reference.t()) :: Pose.point() | nil
   def landmark(%Reference{landmark: nil}), do: nil
   def landmark(%Reference{landmark: {x, y}}), do: {x / 1000, y / 1000}
+
+  @doc """
+  All used slots, `{number, pose}` in the order of the robots, as the leader of the anchor intends them, when it stands at
+  `pose` and its landmark, in truth, so many metres ahead.
+  """
+  @spec intended(Reference.t(), Pose.t(), distance :: float()) :: [{pos_integer(), Pose.t()}]
+  def intended(%Reference{trail: nil} = anchor, pose, distance) do
+    slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
+    for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}
+  end
+
+  def intended(%Reference{trail: trail, pose: {x, y, heading}}, pose, _distance) do
+    believed = Pose.new(x / 1000, y / 1000, heading / 1000)
+
+    for {{sx, sy, sh}, place} <- Enum.with_index(trail, 1) do
+      slot = Pose.relative(believed, Pose.new(sx / 1000, sy / 1000, sh / 1000))
+      {place, Pose.compose(pose, slot)}
+    end
+  end
 
   @doc "The slot of a robot and its velocity; `nil` if the anchor does not name the robot."
   @spec slot(Reference.t(), atom(), non_neg_integer()) :: {Pose.t(), {float(), float()}} | nil

@@ -89,7 +89,7 @@ defmodule Missions.Landmark.State do
           epoch: non_neg_integer(),
           leader: atom() | nil,
           size_ppm: non_neg_integer() | nil,
-          anchor: Swarm.Formation.Reference.t() | nil,
+          anchor: Missions.Landmark.Reference.t() | nil,
           anchor_ms: integer() | nil,
           trail: Swarm.Formation.Trail.t(),
           leadership: Missions.Landmark.Leader.t() | nil,

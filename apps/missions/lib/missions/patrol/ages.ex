@@ -1,6 +1,6 @@
 defmodule Missions.Patrol.Ages do
   @moduledoc """
-  When each point was last seen, by whomever: `%{number => ms}`; a point that nobody has seen is not in it, and is a day old. Pure.
+  Records when each point was last seen, by whomever: `%{number => ms}`; a point that nobody has seen is not in it, and is a day old. Pure.
   """
   alias Hal.Pose
 

@@ -1,6 +1,6 @@
 defmodule Missions.Patrol.Auction do
   @moduledoc """
-  Who visits which point, by auction: an alternative to `Missions.Patrol.Motivation`. Pure.
+  Decides who visits which point, by auction: an alternative to `Missions.Patrol.Motivation`. Pure.
 
   Each tick every robot holds the same sequential auction by itself, over what all have told: the points that are due and
   that nobody is at, and where the robots are that are free. A bid is the distance; the least one wins its point, then the

@@ -3,9 +3,8 @@ defmodule Missions.Landmark.ForgedNumbersTest do
   # takes orders as before.
   use ExUnit.Case, async: true
   alias Missions.Landmark
-  alias Missions.Landmark.Group
+  alias Missions.Landmark.{Group, Reference}
   alias Swarm.Agreement.Round.Letter
-  alias Swarm.Formation.Reference
   alias Swarm.Message
 
   @ids [:mag1, :mag2, :mag3]
@@ -26,7 +25,10 @@ defmodule Missions.Landmark.ForgedNumbersTest do
 
   # All robots hear it, whoever is said to have sent it.
   defp forge(group, from, kind, body) do
-    message = Message.new(from, kind, body)
+    message =
+      if is_struct(body, Reference),
+        do: Missions.Landmark.Beat.pass_on(from, body),
+        else: Message.new(from, kind, body)
 
     for id <- Map.keys(group.robots), id != from, reduce: group do
       group -> Group.hear(group, id, from, message)
@@ -135,7 +137,7 @@ defmodule Missions.Landmark.ForgedNumbersTest do
   end
 
   test "an anchor with the last epoch, in heartbeats or by the chain, is not followed" do
-    for epoch <- @ends, kind <- [:place, :heartbeat] do
+    for epoch <- @ends, kind <- [:claim, :heartbeat] do
       group = fleet()
 
       anchor = %Reference{
@@ -151,7 +153,7 @@ defmodule Missions.Landmark.ForgedNumbersTest do
       }
 
       body =
-        if kind == :place,
+        if kind == :claim,
           do: anchor,
           else: beat(phase: :lead, epoch: 1, leader: :mag9, anchor: anchor)
 
@@ -236,7 +238,7 @@ defmodule Missions.Landmark.ForgedNumbersTest do
       known = group.robots[leader(group)].mission.anchor
 
       forged = %{known | leader: :mag9, asked: {:wedge, 1.0}, asked_no: number}
-      group = group |> forge(:mag9, :place, forged) |> Group.run(1)
+      group = group |> forge(:mag9, :claim, forged) |> Group.run(1)
       asked = {:command, {:formation, :line, 1.5}}
       group = for id <- @ids, reduce: group, do: (group -> Group.event(group, id, asked))
       group = Group.run(group, 2)
@@ -266,8 +268,8 @@ defmodule Missions.Landmark.ForgedNumbersTest do
           sequence: known.sequence + 1
       }
 
-      assert_elects(forge(group, from, :place, forged))
-      assert_elects(group |> forge(from, :place, forged) |> Group.run(1))
+      assert_elects(forge(group, from, :claim, forged))
+      assert_elects(group |> forge(from, :claim, forged) |> Group.run(1))
     end
   end
 
@@ -277,7 +279,7 @@ defmodule Missions.Landmark.ForgedNumbersTest do
       leader = leader(group)
       known = group.robots[leader].mission.anchor
       forged = %{known | sequence: sequence}
-      group = group |> forge(leader, :place, forged) |> Group.run(1.5)
+      group = group |> forge(leader, :claim, forged) |> Group.run(1.5)
 
       for {id, %{mission: mission}} <- group.robots, id != leader do
         assert mission.phase == :follow

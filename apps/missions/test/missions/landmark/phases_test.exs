@@ -1,12 +1,10 @@
 defmodule Missions.Landmark.PhasesTest do
   @moduledoc "Each exit of the table, reached by events."
   use ExUnit.Case, async: true
-  alias Robot.Behaviour
   alias Robot.Localiser.Anchors
-  alias Missions.Landmark.{Beat, Group}
+  alias Missions.Landmark.{Beat, Group, Reference}
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Formation.Reference
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Transitions}
 
@@ -55,7 +53,7 @@ defmodule Missions.Landmark.PhasesTest do
       Group.event(
         group,
         :mag2,
-        {:message, Message.new(:mag1, :place, anchor(group, epoch, order))}
+        {:message, Beat.pass_on(:mag1, anchor(group, epoch, order))}
       )
 
   defp letter(group, id, purpose, fields \\ []) do
@@ -90,7 +88,7 @@ defmodule Missions.Landmark.PhasesTest do
       assert formation == mission(group).formation
       stood = Group.run(stopped, 0.1)
       assert phase(stood) == :idle
-      assert %{goal: {:stand, {Behaviour.Stop, []}}} = stood.robots.mag2
+      assert %{goal: {:stand, {Robot.Behaviour.Stop, []}}} = stood.robots.mag2
       again = stopped |> Group.event(:mag2, {:command, :start}) |> Group.run(0.1)
       assert :search in entered(again, stopped)
     end
@@ -158,7 +156,7 @@ defmodule Missions.Landmark.PhasesTest do
     assert [:search] = entered(seen, resting)
     asked = resting |> beat(:mag1, []) |> letter({9, 1, :mag1}, :search) |> Group.run(0.1)
     assert [] = entered(asked, resting)
-    assert %{found: false} = mission(asked).round.report
+    assert %{merit: nil} = mission(asked).round.report
   end
 
   test "lead -> agree when deposed: by a later epoch at once, unheard after 1.5 s" do
@@ -231,9 +229,9 @@ defmodule Missions.Landmark.PhasesTest do
 
   test "the lease: without an anchor a follower stands after 1 s, and elects after 2 s" do
     group = following() |> Group.run(0.9)
-    assert {{:slot, 1}, {Behaviour.Follow, _}} = group.robots.mag2.goal
+    assert {{:slot, 1}, {Robot.Behaviour.Follow, _}} = group.robots.mag2.goal
     group = Group.run(group, 0.2)
-    assert {:stand, {Behaviour.Stop, []}} = group.robots.mag2.goal
+    assert {:stand, {Robot.Behaviour.Stop, []}} = group.robots.mag2.goal
     assert %{standing: true, in_place: false, phase: :follow} = group.robots.mag2.claim
     assert phase(Group.run(group, 0.7)) == :follow
     assert [:agree | _] = group |> Group.run(1.2) |> entered(group) |> Enum.reverse()
@@ -263,7 +261,7 @@ defmodule Missions.Landmark.PhasesTest do
     known = mission(group).anchor
     assert mission(place(group, 2)).anchor == known
     rival = %{anchor(group, 3, [:mag2]) | leader: :aaa, sequence: 1_000_000}
-    message = Message.new(:aaa, :place, rival)
+    message = Beat.pass_on(:aaa, rival)
     assert mission(Group.event(group, :mag2, {:message, message})).anchor == known
   end
 
@@ -284,8 +282,8 @@ defmodule Missions.Landmark.PhasesTest do
     }
 
     {:lead, _mission, effects} = Landmark.handle({:tick, lost}, mission(leading))
-    assert {:goal, :stand, {Behaviour.Stop, []}} in effects
-    assert [] = for({:send, _to, %Message{kind: :place}} <- effects, do: :place)
+    assert {:goal, :stand, {Robot.Behaviour.Stop, []}} in effects
+    assert [] = for({:claim, _to, _anchor} <- effects, do: :claim)
 
     # Nor does it claim any longer that all stand where they should.
     formed = put_in(mission(leading).leadership.formed?, true)

@@ -6,7 +6,7 @@ defmodule Missions.Landmark.UnsureTest do
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Percept
   alias Swarm.EStop
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Swarm.Membership.Heartbeat
   alias Missions.Landmark
   alias Missions.Landmark.{Follower, Shape}

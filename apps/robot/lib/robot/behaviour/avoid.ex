@@ -17,7 +17,7 @@ defmodule Robot.Behaviour.Avoid do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
-  alias Robot.{Behaviour, Percept, Wish}
+  alias Robot.{Percept, Wish}
   alias Robot.Navigation.{Orca, Steering}
   alias Robot.Behaviour.Avoid
 
@@ -39,11 +39,11 @@ defmodule Robot.Behaviour.Avoid do
   # The speed (m/s) of a robot that makes way.
   @aside 0.2
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     table = [
       inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
-      discs: [{:check, &Behaviour.discs?/1, "[{x, y, radius}]"}, default: []],
+      discs: [{:check, &Robot.Behaviour.discs?/1, "[{x, y, radius}]"}, default: []],
       unmapped: [:boolean, default: false]
     ]
 
@@ -63,14 +63,14 @@ defmodule Robot.Behaviour.Avoid do
     {__MODULE__, Enum.into(options, state)}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def update(options, state) do
     {discs, options} = Keyword.pop(options, :discs, state.discs)
-    inner_options = Keyword.delete(options, :unmapped)
-    {__MODULE__, %{state | discs: discs, inner: Behaviour.update(state.inner, inner_options)}}
+    options = Keyword.delete(options, :unmapped)
+    {__MODULE__, %{state | discs: discs, inner: Robot.Behaviour.update(state.inner, options)}}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, state) do
     {slow?, echoes} = Caution.check(percept, state.discs, state.echoes)
     state = %{state | echoes: echoes}
@@ -81,7 +81,7 @@ defmodule Robot.Behaviour.Avoid do
   end
 
   defp drive(percept, state, limit) do
-    case Behaviour.tick(state.inner, percept) do
+    case Robot.Behaviour.tick(state.inner, percept) do
       {:running, wish, inner} ->
         # Before, because a velocity is bent as it is; and after, because the way round something may go backwards.
         {wish, state} = safe(limit.(wish), percept, %{state | inner: inner})
@@ -149,7 +149,7 @@ defmodule Robot.Behaviour.Avoid do
 
     if distance < leave do
       left = {:left, Pose.distance(percept.pose, wish.goal)}
-      inner = Behaviour.routed(state.inner, left, percept)
+      inner = Robot.Behaviour.routed(state.inner, left, percept)
       wish = %{wish | by: :blocked, twist: Twist.zero(), velocity: {0.0, 0.0}}
       {wish, %{state | inner: inner, blocked?: true, progress: nil, velocity: nil, way: nil}}
     else
@@ -222,11 +222,11 @@ defmodule Robot.Behaviour.Avoid do
 
   # What sonars have seen is doubtful, and forgotten in time: only a floor plan proves that no way leads there.
   defp tell(inner, %{way?: false}, %{grid: %{closed?: true}} = percept),
-    do: Behaviour.routed(inner, :no_way, percept)
+    do: Robot.Behaviour.routed(inner, :no_way, percept)
 
   defp tell(inner, way, percept) do
     left = Avoid.Route.left(way, Pose.point(percept.pose))
-    Behaviour.routed(inner, {:left, left}, percept)
+    Robot.Behaviour.routed(inner, {:left, left}, percept)
   end
 
   defp twist(wish, velocity, preferred, percept, backing?) do

@@ -13,7 +13,7 @@ defmodule Robot.Behaviour.Follow do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
-  alias Robot.{Behaviour, Wish}
+  alias Robot.Wish
   alias Robot.Navigation.Steering
 
   # Nearer than this (metres) it may drive backwards instead of turning round.
@@ -49,7 +49,7 @@ defmodule Robot.Behaviour.Follow do
 
   @impl Robot.Behaviour
   def update(options, state) do
-    if Behaviour.same?(options, state, @options),
+    if Robot.Behaviour.same?(options, state, @options),
       do: {__MODULE__, state},
       else: change(options, state)
   end

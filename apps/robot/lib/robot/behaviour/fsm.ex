@@ -12,14 +12,13 @@ defmodule Robot.Behaviour.Fsm do
   have no entry of their own. An outcome without an entry ends the machine with that outcome.
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
   alias Hal.Options
 
   # The most transitions in one tick. A machine that wants more, such as one that cycles,
   # continues at the next tick.
   @most 8
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     table = [
       start: [{:check, &is_atom/1, "one of the states"}, required: true],
@@ -45,14 +44,14 @@ defmodule Robot.Behaviour.Fsm do
   end
 
   @doc "The name of the present state."
-  @spec at(Behaviour.t()) :: term()
+  @spec at(Robot.Behaviour.t()) :: term()
   def at({__MODULE__, %{at: at}}), do: at
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, state), do: tick(percept, state, @most)
 
   defp tick(percept, state, left) do
-    case Behaviour.tick(state.running, percept) do
+    case Robot.Behaviour.tick(state.running, percept) do
       {:running, wish, running} -> {:running, wish, {__MODULE__, %{state | running: running}}}
       {:done, outcome, wish} -> follow(percept, state, outcome, wish, left)
     end

@@ -8,11 +8,10 @@ defmodule Robot.Behaviour.Parallel do
   `:any`.
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
   alias Robot.Behaviour.Arbiter
   alias Hal.Options
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     table = [
       parts: [behaviours(), required: true],
@@ -25,9 +24,9 @@ defmodule Robot.Behaviour.Parallel do
 
   defp behaviours, do: {:check, &match?([_ | _], &1), "a list of behaviours"}
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, state) do
-    results = Enum.map(state.parts, &Behaviour.tick(&1, percept))
+    results = Enum.map(state.parts, &Robot.Behaviour.tick(&1, percept))
     wish = results |> Enum.map(&wish/1) |> Arbiter.choose(state.last_by)
     outcomes = for {:done, outcome, _wish} <- results, do: outcome
     running = for {:running, _wish, behaviour} <- results, do: behaviour

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Patience do
   @moduledoc """
-  Whether a robot has come nearer to its goal within the time that it has for that. Pure.
+  Decides whether a robot has come nearer to its goal within the time that it has for that. Pure.
 
   Progress is approach, not movement: at each moment it must be nearer than it has ever been until 15 s ago. A robot that
   comes nearer slowly, and then twitches, is judged by when it came nearer, not by the twitch.

@@ -7,27 +7,26 @@ defmodule Robot.Behaviour.Sequence do
   none).
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
   alias Hal.Options
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     behaviours = {:check, &match?([_ | _], &1), "a list of behaviours"}
     table = [steps: [behaviours, required: true], while: [{:integer, -1000, 1000}, default: nil]]
     {__MODULE__, Map.new(Options.check!(options, table, "sequence"))}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, %{steps: [step | rest]} = state) do
-    case Behaviour.tick(step, percept) do
+    case Robot.Behaviour.tick(step, percept) do
       {:running, wish, step} -> {:running, wish, {__MODULE__, %{state | steps: [step | rest]}}}
       {:done, outcome, wish} -> next(outcome, wish, rest, percept, state)
     end
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def routed(route, percept, %{steps: [step | rest]} = state),
-    do: {__MODULE__, %{state | steps: [Behaviour.routed(step, route, percept) | rest]}}
+    do: {__MODULE__, %{state | steps: [Robot.Behaviour.routed(step, route, percept) | rest]}}
 
   # The next step runs within the same tick, so that no tick is lost between two steps.
   defp next(outcome, wish, [], _percept, _state), do: {:done, outcome, wish}

@@ -7,18 +7,18 @@ defmodule Robot.Behaviour.Square do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
-  alias Robot.{Behaviour, Wish}
+  alias Robot.Wish
   alias Robot.Behaviour.{Goto, Sequence}
 
   @table [side: [{:number, 0.2, 10.0, "m"}, default: 1.0]]
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options \\ []) do
     options = Options.check!(options, @table, "square")
     {__MODULE__, {:begin, options[:side]}}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(%{pose: nil}, {:begin, _side} = state),
     do: {:running, Wish.new(:square, Twist.zero(), 0.5), {__MODULE__, state}}
 
@@ -33,13 +33,13 @@ defmodule Robot.Behaviour.Square do
   end
 
   def tick(percept, {:driving, way}) do
-    with {:running, wish, way} <- Behaviour.tick(way, percept),
+    with {:running, wish, way} <- Robot.Behaviour.tick(way, percept),
          do: {:running, wish, {__MODULE__, {:driving, way}}}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def routed(_route, _percept, {:begin, _side} = state), do: {__MODULE__, state}
 
   def routed(route, percept, {:driving, way}),
-    do: {__MODULE__, {:driving, Behaviour.routed(way, route, percept)}}
+    do: {__MODULE__, {:driving, Robot.Behaviour.routed(way, route, percept)}}
 end

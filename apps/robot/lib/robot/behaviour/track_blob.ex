@@ -21,7 +21,7 @@ defmodule Robot.Behaviour.TrackBlob do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
-  alias Robot.{Behaviour, Wish}
+  alias Robot.Wish
   alias Robot.Navigation.Steering
   alias Robot.Percept.{CameraPointing, Sighting}
 
@@ -81,7 +81,7 @@ defmodule Robot.Behaviour.TrackBlob do
 
   @impl Robot.Behaviour
   def update(options, state) do
-    if Behaviour.same?(options, state, @options),
+    if Robot.Behaviour.same?(options, state, @options),
       do: {__MODULE__, state},
       else: change(options, state)
   end

@@ -7,7 +7,7 @@ defmodule Robot.Behaviour.Velocity do
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Twist}
-  alias Robot.{Behaviour, Wish}
+  alias Robot.Wish
   alias Robot.Navigation.Steering
 
   @still 0.03
@@ -23,7 +23,7 @@ defmodule Robot.Behaviour.Velocity do
 
   @impl Robot.Behaviour
   def update(options, state) do
-    if Behaviour.same?(options, state, [:velocity]),
+    if Robot.Behaviour.same?(options, state, [:velocity]),
       do: {__MODULE__, state},
       else: new(Keyword.merge(Map.to_list(state), options))
   end

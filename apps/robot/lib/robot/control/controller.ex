@@ -16,7 +16,7 @@ defmodule Robot.Control.Controller do
   nobody knows (`Robot.Behaviour.Avoid`).
   """
   alias Hal.Profile
-  alias Robot.{Behaviour, Localiser, Mission, Percept, Wish}
+  alias Robot.{Localiser, Mission, Percept, Wish}
   alias Robot.Behaviour.Arbiter
   alias Robot.Navigation.{Grid, OccupancyGrid}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
@@ -41,11 +41,11 @@ defmodule Robot.Control.Controller do
 
   @type t :: %__MODULE__{
           profile: Profile.t(),
-          escape: Behaviour.t(),
-          rest: Behaviour.t(),
+          escape: Robot.Behaviour.t(),
+          rest: Robot.Behaviour.t(),
           tag: term(),
           module: module() | nil,
-          goal: Behaviour.t() | nil,
+          goal: Robot.Behaviour.t() | nil,
           last_by: atom(),
           weights: [{by :: atom(), weight :: float()}],
           localiser: Localiser.t() | nil,
@@ -98,7 +98,7 @@ defmodule Robot.Control.Controller do
   def goal(%__MODULE__{tag: tag, module: module} = controller, tag, {module, options}),
     do: %{
       controller
-      | goal: Behaviour.update(controller.goal, options),
+      | goal: Robot.Behaviour.update(controller.goal, options),
         discs: Keyword.get(options, :discs, controller.discs)
     }
 
@@ -249,7 +249,7 @@ defmodule Robot.Control.Controller do
   defp run(nil, _percept), do: {nil, nil, nil}
 
   defp run(behaviour, percept) do
-    case Behaviour.tick(behaviour, percept) do
+    case Robot.Behaviour.tick(behaviour, percept) do
       {:running, wish, behaviour} -> {wish, behaviour, nil}
       {:done, outcome, wish} -> {wish, nil, outcome}
     end

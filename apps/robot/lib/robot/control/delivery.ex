@@ -1,6 +1,6 @@
 defmodule Robot.Control.Delivery do
   @moduledoc """
-  How a person's command reaches the mission that a robot runs by then, and where the reply goes.
+  Describes how a person's command reaches the mission that a robot runs by then, and where the reply goes.
   The requester lists the ways; the pilot, which alone knows the state of the robot, takes the
   first one that is open (`Robot.Control.Pilot.deliver/3`). Pure.
 

@@ -16,15 +16,13 @@ defmodule Robot.Control.Executive do
   """
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
-  alias Robot.{Behaviour, Board, Config, Departure, Mission, Names, Percept}
+  alias Robot.{Board, Departure, Mission, Names, Percept}
   alias Robot.Control.{Controller, Inbox}
   alias Robot.Trace
   alias Robot.Safety.{DryRun, Gate, Readiness}
 
   @period_ms 100
   @slow_us 50_000
-  # Ticks.
-  @note_again 10
   @call_ms 400
 
   @doc """
@@ -32,8 +30,8 @@ defmodule Robot.Control.Executive do
   change, as `{:walls, packed}`, and each outcome of a goal, as `{:outcome, tag, integer}`, to the sink:
   `apply(m, f, a ++ [event])`.
   """
-  @spec start_link({Config.t(), sink :: Config.call()}) :: GenServer.on_start()
-  def start_link({%Config{} = config, {_m, _f, _a} = sink}) do
+  @spec start_link({Robot.Config.t(), sink :: Robot.Config.call()}) :: GenServer.on_start()
+  def start_link({%Robot.Config{} = config, {_m, _f, _a} = sink}) do
     name = Names.via(config.id, :executive)
     HardenedServer.start_link(__MODULE__, {config, sink}, name: name)
   end
@@ -47,7 +45,7 @@ defmodule Robot.Control.Executive do
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
           :ok | {:error, line :: String.t()}
   def goal(robot, tag, goal) do
-    with :ok <- Behaviour.check(goal) do
+    with :ok <- Robot.Behaviour.check(goal) do
       if Names.whereis(robot, :executive),
         do: ask(robot, {:goal, tag, goal}),
         else: {:error, "no robot #{inspect(robot)} runs on this node"}
@@ -68,7 +66,7 @@ defmodule Robot.Control.Executive do
   Applies `then` in the executive, once it has handled all that this process sent before. An
   executive that hangs never does.
   """
-  @spec confirm(robot :: atom(), then :: Config.call()) :: :ok
+  @spec confirm(robot :: atom(), then :: Robot.Config.call()) :: :ok
   def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
 
   @doc """
@@ -83,7 +81,7 @@ defmodule Robot.Control.Executive do
   Drops the goal and all other orders of the mission, and makes the gate drop the wish, after all
   earlier wishes of the executive; then the gate applies `then`. Ends `hold/1`.
   """
-  @spec stand(robot :: atom(), then :: Config.call() | nil) :: :ok
+  @spec stand(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
 
   @doc "A sink for the drive: holds the executive (`hold/1`) when the wheels are disarmed."
@@ -94,15 +92,15 @@ defmodule Robot.Control.Executive do
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
   @impl GenServer
-  def init({%Config{id: id} = config, sink}) do
+  def init({%Robot.Config{id: id} = config, sink}) do
     Gate.forget(id)
     board = Board.find!(id)
-    at_ms = Config.now(config)
+    at_ms = Robot.Config.now(config)
     doing = %{by: :idle, weights: [], way: [], outcome: nil, fault: nil, tick: 0}
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
-    departed = Departure.Note.read(config.departure_file)
+    departed = Board.departed(board)
 
     s = %{
       config: config,
@@ -116,11 +114,10 @@ defmodule Robot.Control.Executive do
           plan: config.plan
         ),
       departure: if(departed, do: {:was, departed}, else: {:near, nil}),
-      note_at_tick: 0,
       told: nil,
       held?: false,
       tick: 0,
-      ticker: Config.ticker(config, :tick, @period_ms)
+      ticker: Robot.Config.ticker(config, :tick, @period_ms)
     }
 
     Trace.begin(config, :executive, state(s), at_ms)
@@ -183,7 +180,7 @@ defmodule Robot.Control.Executive do
   defp refusal(_order, _s), do: nil
 
   defp obeyed(s, order) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     Trace.input(s.config, :executive, order, at_ms)
     {controller, pan} = Controller.obey(s.controller, order)
     s |> pursue(controller) |> look(pan, at_ms)
@@ -192,11 +189,11 @@ defmodule Robot.Control.Executive do
   @impl GenServer
   def handle_info(:tick, s) do
     begun = System.monotonic_time(:microsecond)
-    s = tick(s, Config.now(s.config))
+    s = tick(s, Robot.Config.now(s.config))
     took = System.monotonic_time(:microsecond) - begun
 
     if took > @slow_us do
-      measured = %{at_ms: Config.now(s.config), duration_ms: div(took, 1_000)}
+      measured = %{at_ms: Robot.Config.now(s.config), duration_ms: div(took, 1_000)}
       Event.execute([:robot, :executive, :slow], measured, %{robot: s.config.id})
     end
 
@@ -209,7 +206,7 @@ defmodule Robot.Control.Executive do
     do: {s.controller, %{looks: config.ptz != nil and not config.dry_run}}
 
   defp drop(s, then) do
-    Trace.input(s.config, :executive, :stand, Config.now(s.config))
+    Trace.input(s.config, :executive, :stand, Robot.Config.now(s.config))
     Gate.forget(s.config.id, then)
     pursue(s, Controller.stand(s.controller))
   end
@@ -219,7 +216,7 @@ defmodule Robot.Control.Executive do
     do: %{s | controller: controller}
 
   defp pursue(s, controller) do
-    Board.put(s.board, :executive, :goal, controller.module, Config.now(s.config))
+    Board.put(s.board, :executive, :goal, controller.module, Robot.Config.now(s.config))
     %{s | controller: controller}
   end
 
@@ -262,37 +259,20 @@ defmodule Robot.Control.Executive do
 
   defp depart(%{departure: {:was, noted}} = s, %Odometry{frame: frame}) do
     if not Departure.start?(noted, frame) do
-      measured = %{at_ms: Config.now(s.config)}
+      measured = %{at_ms: Robot.Config.now(s.config)}
       Event.execute([:robot, :executive, :away], measured, %{robot: s.config.id})
     end
 
     %{s | departure: :noted}
   end
 
-  # Of counters that jump away from zero nobody knows where it is: noted is the frame of the last reading near zero.
+  # After a counter jump the place is unknown, so the frame of the last reading near zero is noted.
   defp depart(%{departure: {:near, frame}} = s, %Odometry{pose: pose} = odometry) do
-    if Departure.left?(pose),
-      do: note(%{s | departure: {:left, frame || Departure.frame(nil)}}),
-      else: %{s | departure: {:near, Departure.frame(odometry.frame)}}
-  end
-
-  defp depart(%{departure: {:left, _frame}} = s, _odometry), do: note(s)
-
-  # Written here, because what comes after a crash must find it: a line, not synced, to a folder in memory. A disk that
-  # hangs meets the gate's dead man's switch. What fails is tried again once a second.
-  defp note(%{config: %{id: id, departure_file: path}, departure: {:left, frame}} = s) do
-    cond do
-      s.note_at_tick > s.tick ->
-        s
-
-      Departure.Note.write(path, frame) == :ok ->
-        %{s | departure: :noted}
-
-      true ->
-        if s.note_at_tick == 0,
-          do: Event.execute([:robot, :departure_file, :failed], %{}, %{robot: id, file: path})
-
-        %{s | note_at_tick: s.tick + @note_again}
+    if Departure.left?(pose) do
+      Board.depart(s.board, frame || Departure.frame(nil))
+      %{s | departure: :noted}
+    else
+      %{s | departure: {:near, Departure.frame(odometry.frame)}}
     end
   end
 

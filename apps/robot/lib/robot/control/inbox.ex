@@ -1,12 +1,12 @@
 defmodule Robot.Control.Inbox do
   @moduledoc """
-  Whether what arrives at the executive or the pilot is whole, so that one can calculate with it. Any process of a node
+  Decides whether what arrives at the executive or the pilot is whole, so that one can calculate with it. Any process of a node
   may send them anything; what only looks like a message of theirs ends neither (`docs/security.md`). Pure.
 
   Numbers count up to 1.0e9 either way, which no robot measures: there are integers too large to be made a float.
   """
   alias Hal.{HardenedServer, Odometry, Pose, Profile, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Control.Delivery
   alias Robot.Localiser.Anchors
   alias Vision.{Blob, Detections}
@@ -32,7 +32,7 @@ defmodule Robot.Control.Inbox do
       [false, false, false]
   """
   @spec order?(term()) :: boolean()
-  def order?({:goal, _tag, goal}), do: Behaviour.check(goal) == :ok
+  def order?({:goal, _tag, goal}), do: Robot.Behaviour.check(goal) == :ok
   def order?({:look, pan}), do: pan == nil or is_measure(pan)
 
   def order?({:anchors, %{__struct__: Anchors, frame: frame, marks: marks, standing: standing}}),

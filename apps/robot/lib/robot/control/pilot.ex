@@ -20,7 +20,7 @@ defmodule Robot.Control.Pilot do
   """
   use GenServer
   alias Hal.HardenedServer
-  alias Robot.{Board, Config, Mission, Names, Percept}
+  alias Robot.{Board, Mission, Names, Percept}
   alias Robot.Control.{Delivery, Executive, Inbox}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
@@ -33,8 +33,8 @@ defmodule Robot.Control.Pilot do
   @old_ms 1_000
 
   @doc "Starts the pilot of a robot."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config),
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config),
     do:
       HardenedServer.start_link(__MODULE__, config,
         name: Names.via(config.id, :pilot),
@@ -61,7 +61,7 @@ defmodule Robot.Control.Pilot do
   The same for callers that must not wait. `then` is applied once it is done, and not at all if
   the pilot, the executive or the gate hangs or crashes meanwhile.
   """
-  @spec halt(robot :: atom(), then :: Config.call() | nil) :: :ok
+  @spec halt(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def halt(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :pilot), {:halt, then})
 
@@ -70,7 +70,7 @@ defmodule Robot.Control.Pilot do
   delay the others; `then` as in `halt/2`. The goal is dropped even if the pilot is stuck in its mission,
   and again when the mission has ended, because it may have set another one meanwhile.
   """
-  @spec halt_at_once(robot :: atom(), then :: Config.call() | nil) :: :ok
+  @spec halt_at_once(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def halt_at_once(robot, then) do
     :ok = Gate.forget(robot)
     :ok = Executive.hold(robot)
@@ -125,13 +125,13 @@ defmodule Robot.Control.Pilot do
   defp call(robot, request), do: GenServer.call(Names.via(robot, :pilot), request, @call_ms)
 
   @impl GenServer
-  def init(%Config{} = config) do
+  def init(%Robot.Config{} = config) do
     data = %{
       config: config,
       board: Board.find!(config.id),
       runner: Runner.new(config.id, plan(config)),
       options: [],
-      since_ms: Config.now(config)
+      since_ms: Robot.Config.now(config)
     }
 
     # The former pilot may have crashed within a callback, and the executive may still have its
@@ -335,7 +335,7 @@ defmodule Robot.Control.Pilot do
 
   # A robot that was frozen decides by what it perceives now: by its old percept a leader would
   # believe that its lease lasts.
-  defp old?({:tick, %{at_ms: at_ms}}, config), do: Config.now(config) - at_ms > @old_ms
+  defp old?({:tick, %{at_ms: at_ms}}, config), do: Robot.Config.now(config) - at_ms > @old_ms
 
   defp handle(event, data) do
     Journal.heard(event, data)

@@ -33,7 +33,8 @@ defmodule Robot.Departure.Note do
   @spec write(Path.t(), Departure.frame()) :: :ok | {:error, File.posix()}
   def write(path, frame) do
     aside = path <> ".new"
-    with :ok <- File.write(aside, "#{boot()}\n#{frame}\n"), do: File.rename(aside, path)
+    # `:raw`: a disk that hangs, hangs the caller, and not the node's file server.
+    with :ok <- File.write(aside, "#{boot()}\n#{frame}\n", [:raw]), do: File.rename(aside, path)
   end
 
   @doc "Deletes the note."

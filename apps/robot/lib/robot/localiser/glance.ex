@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Glance do
   @moduledoc """
-  Whether a robot can concern a picture at all, by a bound that costs little. Pure.
+  Decides whether a robot can concern a picture at all, by a bound that costs little. Pure.
 
   In a large fleet most robots stand beside the picture or behind the camera. What a picture says of one depends on its
   direction and on how uncertain that is, whose exact value takes two products with a covariance matrix. The bound takes

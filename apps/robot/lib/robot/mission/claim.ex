@@ -1,6 +1,6 @@
 defmodule Robot.Mission.Claim do
   @moduledoc """
-  What a mission says of itself to all other robots, five times a second, with their heartbeats. Pure.
+  Describes what a mission says of itself to all other robots, five times a second, with their heartbeats. Pure.
 
   A mission names a struct for it (`c:Robot.Mission.claims/0`); the fields' values come from its
   effect `{:claim, map}`, or are the struct's defaults. Who runs the same version of the same mission hears them; everybody else

@@ -16,7 +16,7 @@ defmodule Robot.Mission.Manual do
   (R34).
   """
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Command, Percept}
+  alias Robot.{Command, Percept}
   alias Robot.Behaviour.Blocker
   alias Robot.Navigation.{Grid, Reach}
 
@@ -42,7 +42,7 @@ defmodule Robot.Mission.Manual do
 
   @impl Robot.Mission
   def handle({:command, command}, mission) do
-    with {_module, _options} = goal <- goal(command, nil), :ok <- Behaviour.check(goal) do
+    with {_module, _options} = goal <- goal(command, nil), :ok <- Robot.Behaviour.check(goal) do
       mission = %{mission | command: command, count: mission.count + 1, result: nil, why: nil}
       goal = {:goal, {:command, mission.count}, goal}
       result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
@@ -112,36 +112,43 @@ defmodule Robot.Mission.Manual do
   defp claim(%{command: {:follow_the_leader, leader}}), do: %{phase: :idle, leader: leader}
   defp claim(_command), do: %{phase: :idle, standing: false}
 
-  defp goal({:move, linear, turn}, _percept), do: {Behaviour.Move, linear: linear, turn: turn}
+  defp goal({:move, linear, turn}, _percept),
+    do: {Robot.Behaviour.Move, linear: linear, turn: turn}
+
   # What somebody who steers says again and again: it ends by itself when the words do.
   defp goal({:move, linear, turn, for_s}, _percept),
-    do: {Behaviour.Move, linear: linear, turn: turn, for_ms: for_s * 1_000}
+    do: {Robot.Behaviour.Move, linear: linear, turn: turn, for_ms: for_s * 1_000}
 
-  defp goal({:goto, x, y, nil}, _percept), do: {Behaviour.Goto, x: x, y: y}
-  defp goal({:goto, x, y, heading}, _percept), do: {Behaviour.Goto, x: x, y: y, heading: heading}
-  defp goal({:follow, %Pose{} = place}, _percept), do: {Behaviour.Follow, target: place}
-  defp goal(:wander, _percept), do: {Behaviour.Wander, []}
-  defp goal(:rest, _percept), do: {Behaviour.Rest, []}
-  defp goal({:square, nil}, _percept), do: {Behaviour.Square, []}
-  defp goal({:square, side}, _percept), do: {Behaviour.Square, side: side}
-  defp goal({:find_blob, colour}, _percept), do: {Behaviour.FindBlob, colour: colour}
+  defp goal({:goto, x, y, nil}, _percept), do: {Robot.Behaviour.Goto, x: x, y: y}
+
+  defp goal({:goto, x, y, heading}, _percept),
+    do: {Robot.Behaviour.Goto, x: x, y: y, heading: heading}
+
+  defp goal({:follow, %Pose{} = place}, _percept), do: {Robot.Behaviour.Follow, target: place}
+  defp goal(:wander, _percept), do: {Robot.Behaviour.Wander, []}
+  defp goal(:rest, _percept), do: {Robot.Behaviour.Rest, []}
+  defp goal({:square, nil}, _percept), do: {Robot.Behaviour.Square, []}
+  defp goal({:square, side}, _percept), do: {Robot.Behaviour.Square, side: side}
+  defp goal({:find_blob, colour}, _percept), do: {Robot.Behaviour.FindBlob, colour: colour}
 
   # Stands until the next percept contains the followed robot.
-  defp goal({:follow_the_leader, _leader}, nil), do: {Behaviour.Stop, []}
+  defp goal({:follow_the_leader, _leader}, nil), do: {Robot.Behaviour.Stop, []}
 
   defp goal({:follow_the_leader, leader}, %Percept{peers: peers, at_ms: now_ms}) do
     case peers do
       %{^leader => %{at_ms: at_ms} = peer} when now_ms - at_ms < @silent_ms -> behind(peer)
-      _silent -> {Behaviour.Stop, []}
+      _silent -> {Robot.Behaviour.Stop, []}
     end
   end
 
   # A coloured object that is carried before its camera leads it, and others follow (R35).
-  defp goal(:lead, _percept), do: {Behaviour.TrackBlob, []}
+  defp goal(:lead, _percept), do: {Robot.Behaviour.TrackBlob, []}
   defp goal(_unknown, nil), do: nil
 
   defp behind(%{pose: pose, twist: %Twist{linear: linear}}) do
     velocity = {linear * :math.cos(pose.heading), linear * :math.sin(pose.heading)}
-    {Behaviour.Follow, target: Pose.compose(pose, Pose.new(-@behind, 0)), velocity: velocity}
+
+    {Robot.Behaviour.Follow,
+     target: Pose.compose(pose, Pose.new(-@behind, 0)), velocity: velocity}
   end
 end

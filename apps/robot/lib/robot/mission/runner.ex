@@ -6,8 +6,8 @@ defmodule Robot.Mission.Runner do
   Events for an idle robot are dropped. The caller carries out the effects, in their order, except
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
-  alias Robot.{Behaviour, Mission, Percept}
-  alias Robot.Mission.Letter
+  alias Robot.{Mission, Percept}
+  alias Robot.Mission.{Claim, Letter}
   alias Robot.Navigation.Grid
 
   @enforce_keys [:robot]
@@ -131,13 +131,19 @@ defmodule Robot.Mission.Runner do
   end
 
   defp said({:tell, to, kind, fields}, module), do: {:send, to, Letter.new!(module, kind, fields)}
+
+  defp said({:claim, to, claim}, module) do
+    %Claim{} = claim = Claim.new(module, claim)
+    {:send, to, claim}
+  end
+
   defp said(effect, _module), do: effect
 
   defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}
 
   # An invalid goal is an error of the mission, so the mission crashes, not the controller.
   defp note({:goal, _tag, goal}, runner) do
-    with {:error, line} <- Behaviour.check(goal), do: raise(ArgumentError, line)
+    with {:error, line} <- Robot.Behaviour.check(goal), do: raise(ArgumentError, line)
     runner
   end
 

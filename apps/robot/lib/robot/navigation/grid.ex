@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Grid do
   @moduledoc """
-  What a robot knows of walls: a grid of square cells, each with its clearance, and the ways over it. Pure; metres, in the
+  Describes what a robot knows of walls: a grid of square cells, each with its clearance, and the ways over it. Pure; metres, in the
   frame of the map.
 
   `clear` has one byte for each cell, rows from the lowest y: at most the distance from the cell's centre to the nearest

@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Reach do
   @moduledoc """
-  Whether a robot can get to a place, by what it knows of walls. Pure; metres, in the frame of the map.
+  Decides whether a robot can get to a place, by what it knows of walls. Pure; metres, in the frame of the map.
 
   The same ways as those that it drives (`Robot.Behaviour.Avoid.Route`): where this finds one, it finds one, too. Bodies that
   stand about do not count, as they may go away.

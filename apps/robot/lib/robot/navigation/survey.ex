@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Survey do
   @moduledoc """
-  What a robot's sonars have seen of a building since it began, in the frame of the map: evidence for cells of 10 cm, in
+  Records what a robot's sonars have seen of a building since it began, in the frame of the map: evidence for cells of 10 cm, in
   tiles of 16 x 16 cells that are there where something was seen. Pure.
 
   Readings count as in `Robot.Navigation.OccupancyGrid` and by its kernels, but at the pose that the robot estimated at that

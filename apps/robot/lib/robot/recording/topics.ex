@@ -1,6 +1,6 @@
 defmodule Robot.Recording.Topics do
   @moduledoc """
-  What other tools see of a recording of robots of processes, from the same entries that a replay
+  Describes what other tools see of a recording of robots of processes, from the same entries that a replay
   reads. A robot knows no truth: all poses are its own estimates. Pure.
 
   | topic | what | schema |
@@ -169,6 +169,7 @@ defmodule Robot.Recording.Topics do
   defp sender(_other), do: "?"
 
   defp kind(%{kind: kind}) when is_atom(kind), do: "#{kind}"
+  defp kind(%Robot.Mission.Claim{}), do: "claim"
   defp kind(_other), do: "?"
 
   defp claim(%{claimed_ms: claimed_ms} = robot, _id, _claim, at_ms)

@@ -1,6 +1,6 @@
 defmodule Robot.Replay.Moment do
   @moduledoc """
-  What a replayed robot did last, and from what: kept during a replay, for people who ask why
+  Describes what a replayed robot did last, and from what: kept during a replay, for people who ask why
   (`mix replay --why`). Pure.
   """
   alias Robot.Control.Controller

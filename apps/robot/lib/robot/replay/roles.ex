@@ -1,6 +1,6 @@
 defmodule Robot.Replay.Roles do
   @moduledoc """
-  What the processes of a robot do on an input (`Robot.Trace`), as functions of their
+  Describes what the processes of a robot do on an input (`Robot.Trace`), as functions of their
   state: the same pure functions that they call, and the order in which they carry out the effects.
   Pure if the mission is.
   """

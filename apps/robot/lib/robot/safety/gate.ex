@@ -19,15 +19,15 @@ defmodule Robot.Safety.Gate do
   """
   use GenServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
-  alias Robot.{Board, Config, Departure, Names}
+  alias Robot.{Board, Names}
   alias Robot.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
   @period_ms 50
 
   @doc "Starts the gate of a robot; it first commands the wheels to stop."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config),
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config),
     do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
 
   @doc "Wishes a speed; the newest wish is valid for 200 ms."
@@ -39,7 +39,7 @@ defmodule Robot.Safety.Gate do
   or the executive was restarted. Then applies `then`, if given, to notify the process that waits
   for the stop.
   """
-  @spec forget(robot :: atom(), then :: Config.call() | nil) :: :ok
+  @spec forget(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def forget(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :gate), {:forget, then})
 
@@ -51,9 +51,10 @@ defmodule Robot.Safety.Gate do
   def sense(_robot, _reading), do: :ok
 
   @doc """
-  Stops the robot until `reset/1`. When this returns, the latch is set and the stop has been sent
-  to the drive's device. The process that owns the state of the e-stop sets the latch with
-  `tell: false`: then the config's `:on_latch` is not applied.
+  Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
+  the drive's device, and the latch is in its file (`Robot.Board.saved/2`). The process that owns
+  the state of the e-stop sets the latch with `tell: false`: then the config's `:on_latch` is not
+  applied, and this does not wait for the file.
   """
   @spec estop(robot :: atom(), tell: boolean()) :: :ok
   def estop(robot, options \\ []),
@@ -80,14 +81,14 @@ defmodule Robot.Safety.Gate do
   end
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     # A stop must not wait for the processes that communicate; the gate's own work is short.
     Process.flag(:priority, :high)
     drive = Names.via(id, :drive)
     Device.drive(drive, Twist.zero())
     board = Board.find!(id)
     latched? = Board.latched?(board)
-    at_ms = Config.now(config)
+    at_ms = Robot.Config.now(config)
     if config.dry_run, do: DryRun.attach()
     Event.execute([:robot, :gate, :start], %{at_ms: at_ms}, %{robot: id, latched?: latched?})
 
@@ -101,11 +102,11 @@ defmodule Robot.Safety.Gate do
           armed?: armed?(board, config),
           fence: config.fence,
           start: config.start,
-          frame: frame(board, config)
+          frame: frame(board)
         ),
       told: nil,
       limits: nil,
-      ticker: Config.ticker(config, :step, @period_ms)
+      ticker: Robot.Config.ticker(config, :step, @period_ms)
     }
 
     Trace.begin(config, :gate, state(s), at_ms)
@@ -136,16 +137,19 @@ defmodule Robot.Safety.Gate do
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
-  def handle_call({:estop, tell?}, _from, s) when is_boolean(tell?) do
+  def handle_call({:estop, tell?}, from, s) when is_boolean(tell?) do
     at_ms = heard(s, :estop)
-    # The wheels come first: the latch may also be written to a file, and a disk may be slow.
-    Board.hold(s.board)
+    Board.latch(s.board)
     if tell?, do: Board.put(s.board, :gate, :presses, presses(s.board) + 1, at_ms)
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
     if tell?, do: tell_latch(s)
-    Board.latch(s.board)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
-    {:reply, :ok, s}
+    # Whoever pressed the button may wait for a disk; these steps do not.
+    if tell?,
+      do: Board.saved(s.board, {GenServer, :reply, [from, :ok]}),
+      else: GenServer.reply(from, :ok)
+
+    {:noreply, s}
   end
 
   def handle_call({:reset, tell?, presses}, _from, s)
@@ -175,7 +179,7 @@ defmodule Robot.Safety.Gate do
 
   @impl GenServer
   def handle_info(:step, s) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
     {:noreply, s |> step(at_ms) |> schedule()}
   end
@@ -202,10 +206,10 @@ defmodule Robot.Safety.Gate do
     %{s | reflex: reflex}
   end
 
-  defp frame(board, config) do
+  defp frame(board) do
     with :error <- Board.fetch(board, :frame, :infinity) do
-      noted = Departure.Note.read(config.departure_file)
-      if noted, do: {:was, noted}
+      departed = Board.departed(board)
+      if departed, do: {:was, departed}
     else
       {:ok, frame, _at_ms} -> frame
     end
@@ -242,7 +246,7 @@ defmodule Robot.Safety.Gate do
   defp tell_latch(s), do: with({m, f, a} <- s.config.on_latch, do: apply(m, f, a))
 
   defp heard(s, what) do
-    at_ms = Config.now(s.config)
+    at_ms = Robot.Config.now(s.config)
     Trace.input(s.config, :gate, what, at_ms)
     at_ms
   end

@@ -19,7 +19,7 @@ defmodule Robot.Safety.LivenessMonitor do
   """
   use GenServer
   alias Hal.{Event, HardenedServer}
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
 
   @look_ms 50
   @silent 8
@@ -73,12 +73,12 @@ defmodule Robot.Safety.LivenessMonitor do
   def words(:pilot, mission), do: "its mission #{inspect(mission)}"
 
   @doc "Starts the monitor of a robot whose board is running."
-  @spec start_link(Config.t()) :: GenServer.on_start()
-  def start_link(%Config{} = config),
+  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
+  def start_link(%Robot.Config{} = config),
     do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     board = Board.find!(id)
     for part <- @parts, do: forget(board, part)
 
@@ -150,7 +150,7 @@ defmodule Robot.Safety.LivenessMonitor do
 
   defp note(s, part, what) do
     module = module(part, s.board)
-    Board.put(s.board, :watch, {:hung, part}, {what, module}, Config.now(s.config))
+    Board.put(s.board, :watch, {:hung, part}, {what, module}, Robot.Config.now(s.config))
     tell(s, part, what)
     module
   end
@@ -158,7 +158,7 @@ defmodule Robot.Safety.LivenessMonitor do
   defp tell(%{config: config} = s, part, what) do
     {:ok, {_what, module}, _at_ms} = Board.fetch(s.board, {:hung, part}, :infinity)
     about = Map.merge(where(part, module), %{robot: config.id, line: words(part, module)})
-    Event.execute([:robot, part, what], %{at_ms: Config.now(config)}, about)
+    Event.execute([:robot, part, what], %{at_ms: Robot.Config.now(config)}, about)
   end
 
   defp where(:gate, nil), do: %{}

@@ -6,17 +6,17 @@ defmodule Robot.Safety.Readiness do
   drive itself. In a dry run nothing moves, and every order is accepted.
   """
   alias Hal.Device.Words
-  alias Robot.{Board, Config}
+  alias Robot.Board
 
   @typedoc "The board's entries `:arming` and `{:health, :drive}`; `nil` if there is none yet."
   @type arming :: %{state: Hal.Device.Arming.state(), why: String.t() | nil} | nil
   @type health :: :online | {:offline, reason :: term()} | nil
 
   @doc "Judges a robot of this node by its config and its board (`judge/2`)."
-  @spec of(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
-  def of(%Config{dry_run: true}, _board), do: :ok
+  @spec of(Robot.Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def of(%Robot.Config{dry_run: true}, _board), do: :ok
 
-  def of(%Config{drive: drive}, board) do
+  def of(%Robot.Config{drive: drive}, board) do
     case entry(board, {:health, :drive}) do
       # It is told again and again; an order may turn them.
       {:offline, {:stands, :wheels}} ->
@@ -34,9 +34,9 @@ defmodule Robot.Safety.Readiness do
   The same of the wheels alone: a drive that is armed and has gone offline because it does not obey
   is told again and again, until it does.
   """
-  @spec armed(Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
-  def armed(%Config{dry_run: true}, _board), do: :ok
-  def armed(%Config{}, board), do: judge(entry(board, :arming), nil)
+  @spec armed(Robot.Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
+  def armed(%Robot.Config{dry_run: true}, _board), do: :ok
+  def armed(%Robot.Config{}, board), do: judge(entry(board, :arming), nil)
 
   @doc """
   `:ok`, or the reason as a line that does not name the robot. If the reason why the drive is

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.AvoidTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Body}
+  alias Robot.Body
   alias Robot.Navigation.{Orca, PathPlanner}
   alias Robot.Behaviour.{Avoid, Follow, Goto, Move}
   doctest Robot.Navigation.Orca
@@ -129,7 +129,7 @@ defmodule Robot.Behaviour.AvoidTest do
   describe "Avoid" do
     defp tick(inner, pose, change \\ & &1, discs \\ []) do
       percept = pose |> Body.new() |> Body.percept() |> change.()
-      {:running, wish, _} = Behaviour.tick(Avoid.new(inner: inner, discs: discs), percept)
+      {:running, wish, _} = Robot.Behaviour.tick(Avoid.new(inner: inner, discs: discs), percept)
       wish
     end
 
@@ -138,7 +138,7 @@ defmodule Robot.Behaviour.AvoidTest do
         {x, y} = any(3.0)
         pose = Pose.new(x, y, 6.3 * :rand.uniform())
         inner = Follow.new(target: Pose.new(1, 1))
-        {:running, alone, _} = Behaviour.tick(inner, Body.percept(Body.new(pose)))
+        {:running, alone, _} = Robot.Behaviour.tick(inner, Body.percept(Body.new(pose)))
         assert tick(inner, pose) == alone
         far = &%{&1 | peers: %{a: peer(Pose.new(20, 20))}}
         assert tick(inner, pose, far) == alone

@@ -2,7 +2,7 @@ defmodule Robot.Behaviour.CautionTest do
   @moduledoc "A robot among others that does not know where it is."
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.{Acts, Behaviour, Percept}
+  alias Robot.{Acts, Percept}
   alias Robot.Behaviour.{Avoid, Goto}
 
   doctest Robot.Behaviour.Avoid.Echoes
@@ -19,7 +19,7 @@ defmodule Robot.Behaviour.CautionTest do
   end
 
   defp speed(inner, percept) do
-    assert {:running, wish, _state} = Behaviour.tick(Avoid.new(inner: inner), percept)
+    assert {:running, wish, _state} = Robot.Behaviour.tick(Avoid.new(inner: inner), percept)
     wish.twist.linear
   end
 
@@ -142,7 +142,7 @@ defmodule Robot.Behaviour.CautionTest do
 
     {speeds, _state} =
       Enum.map_reduce(1..10, Avoid.new(inner: Aside.new(velocity: {-0.15, 0.1})), fn n, state ->
-        {:running, wish, state} = Behaviour.tick(state, %{percept | at_ms: 100 * n})
+        {:running, wish, state} = Robot.Behaviour.tick(state, %{percept | at_ms: 100 * n})
         {wish.twist.linear, state}
       end)
 

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.CombinatorsTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
-  alias Robot.{Behaviour, Body, Percept}
+  alias Robot.{Body, Percept}
   alias Robot.Behaviour.{Fsm, Goto, Move, Once, Parallel, Rest, Sequence, Wander}
   alias Robot.Behaviour.Decorator.{Every, Until}
 
@@ -12,7 +12,7 @@ defmodule Robot.Behaviour.CombinatorsTest do
   defp run(_behaviour, at_ms, by) when at_ms > 5000, do: {:never, at_ms, Enum.reverse(by)}
 
   defp run(behaviour, at_ms, by) do
-    case Behaviour.tick(behaviour, percept(at_ms)) do
+    case Robot.Behaviour.tick(behaviour, percept(at_ms)) do
       {:running, wish, behaviour} -> run(behaviour, at_ms + 100, [wish && wish.by | by])
       {:done, outcome, _wish} -> {outcome, at_ms, Enum.reverse(by)}
     end

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.GotoTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.{Behaviour, Body}
+  alias Robot.Body
   alias Robot.Behaviour.{Blocker, Goto, Patience}
   alias Robot.Control.Controller
   alias Robot.Navigation.{Grid, Reach}
@@ -100,7 +100,7 @@ defmodule Robot.Behaviour.GotoTest do
     percept = Body.percept(Body.new(Pose.new(0, 0)))
 
     assert {_, %{steps: [{Goto, %{way?: false}}, {Goto, %{way?: true}}]}} =
-             steps |> Behaviour.Sequence.new() |> Behaviour.routed(:no_way, percept)
+             steps |> Robot.Behaviour.Sequence.new() |> Robot.Behaviour.routed(:no_way, percept)
   end
 
   test "an echo of a wall that the map shows is nothing unknown" do

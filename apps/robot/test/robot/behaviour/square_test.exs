@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.SquareTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Behaviour.Square
 
   defp percept(pose, tick),
@@ -9,7 +9,7 @@ defmodule Robot.Behaviour.SquareTest do
 
   # 100 ms a tick, on wheels that do at once what they are told.
   defp drive(behaviour, pose, way, tick \\ 0) do
-    case Behaviour.tick(behaviour, percept(pose, tick)) do
+    case Robot.Behaviour.tick(behaviour, percept(pose, tick)) do
       {:running, wish, behaviour} when tick < 2_000 ->
         step = Pose.new(wish.twist.linear * 0.1, 0, wish.twist.turn * 0.1)
         drive(behaviour, Pose.compose(pose, step), [pose | way], tick + 1)
@@ -29,11 +29,13 @@ defmodule Robot.Behaviour.SquareTest do
   end
 
   test "without a pose it stands; a corner that cannot be reached ends it" do
-    assert {:running, %{twist: twist}, square} = Behaviour.tick(Square.new([]), percept(nil, 0))
+    assert {:running, %{twist: twist}, square} =
+             Robot.Behaviour.tick(Square.new([]), percept(nil, 0))
+
     assert twist == Hal.Twist.zero()
-    {:running, _wish, square} = Behaviour.tick(square, percept(Pose.new(0, 0), 1))
-    square = Behaviour.routed(square, :no_way, percept(Pose.new(0, 0), 1))
-    assert {:done, 0, _wish} = Behaviour.tick(square, percept(Pose.new(0, 0), 2))
+    {:running, _wish, square} = Robot.Behaviour.tick(square, percept(Pose.new(0, 0), 1))
+    square = Robot.Behaviour.routed(square, :no_way, percept(Pose.new(0, 0), 1))
+    assert {:done, 0, _wish} = Robot.Behaviour.tick(square, percept(Pose.new(0, 0), 2))
   end
 
   test "a wrong side is refused by name" do

@@ -1,14 +1,14 @@
 defmodule Robot.Behaviour.VelocityTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Behaviour.Velocity
 
   defp wish(velocity, pose) do
     percept = %Percept{robot: :mag1, at_ms: 0, profile: Profile.magellan(), pose: pose}
 
     {:running, wish, {Velocity, _state}} =
-      Behaviour.tick(Velocity.new(velocity: velocity), percept)
+      Robot.Behaviour.tick(Velocity.new(velocity: velocity), percept)
 
     wish
   end
@@ -29,11 +29,11 @@ defmodule Robot.Behaviour.VelocityTest do
   end
 
   test "the velocity changes while it runs, and junk is refused" do
-    changed = Behaviour.update(Velocity.new(velocity: {0.1, 0.0}), velocity: {0.2, 0.0})
+    changed = Robot.Behaviour.update(Velocity.new(velocity: {0.1, 0.0}), velocity: {0.2, 0.0})
     assert changed == Velocity.new(velocity: {0.2, 0.0})
 
     for junk <- [nil, {1, :east}, {1.0e3, 0}, [0, 1]] do
-      assert {:error, line} = Behaviour.check({Velocity, velocity: junk})
+      assert {:error, line} = Robot.Behaviour.check({Velocity, velocity: junk})
       assert line =~ "velocity option velocity cannot be"
     end
   end

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.DriveCourseTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Calibration.DriveCourse
 
   # Wheels that do what is wished, 100 ms later.
@@ -26,7 +26,7 @@ defmodule Robot.Behaviour.DriveCourseTest do
         bumpers: bumpers
       }
 
-      case Behaviour.tick(s.course, percept) do
+      case Robot.Behaviour.tick(s.course, percept) do
         {:done, outcome, wish} ->
           assert Twist.zero?(wish.twist)
           {:halt, {outcome, 100 * n, Pose.relative(Pose.new(1, 2, 0.5), s.pose), s.turned}}

@@ -72,28 +72,28 @@ defmodule Robot.Safety.GateTest do
     rolls()
   end
 
-  def wait(_event, _measured, %{robot: :gate8}, test) do
-    send(test, {:writing, self()})
-    receive(do: (:written -> :ok), after: (20_000 -> :ok))
-  end
-
-  def wait(_event, _measured, _others, _test), do: :ok
-
   @tag :tmp_dir
-  test "an e-stop stops the wheels before its file is written", %{tmp_dir: folder} do
-    # A disk that takes its time: who hears that it failed makes the gate wait.
-    event = [:robot, :estop_file, :error]
-    :ok = Hal.Event.attach(:gate8, event, &__MODULE__.wait/4, self())
-    on_exit(fn -> Hal.Event.detach(:gate8) end)
-    id = rolling(:gate8, estop_file: Path.join(folder, "missing/estop"))
+  test "a disk that hangs holds back the answer to an e-stop, and no step", %{tmp_dir: folder} do
+    file = Path.join(folder, "estop")
+    id = rolling(:gate8, estop_file: file)
     rolls()
+    Robot.Case.hang(file)
     answer = Task.async(fn -> Gate.estop(id) end)
-    assert_receive {:writing, gate}
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero
     assert Board.latched?(Board.find!(id))
+    # Other steps follow, and the person's reset and next stop are heard.
+    for _step <- 1..5, do: assert_receive({:drive, {:drive, twist}, _} when twist == @zero)
+    assert Gate.reset(id) == :ok
+    rolls()
+    assert Gate.estop(id, tell: false) == :ok
+    stands(250)
+    refute Board.saved?(Board.find!(id))
     assert Task.yield(answer, 0) == nil
-    send(gate, :written)
+
+    Robot.Case.resume(file)
     assert Task.await(answer) == :ok
+    assert Board.saved?(Board.find!(id))
+    assert File.exists?(file)
   end
 
   test "a gate that starts again does not lay its fence in another frame of odometry" do

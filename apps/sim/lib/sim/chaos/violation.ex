@@ -1,5 +1,5 @@
 defmodule Sim.Chaos.Violation do
-  @moduledoc "What was wrong in a run: which invariant, when, with which robots, and the figures in one line."
+  @moduledoc "Describes what was wrong in a run: which invariant, when, with which robots, and the figures in one line."
 
   @enforce_keys [:invariant, :at_ms, :robots, :figures]
   defstruct @enforce_keys

@@ -1,6 +1,6 @@
 defmodule Sim.Fleet.Backend do
   @moduledoc """
-  Where the robots and the world of a `Sim.Fleet` run: in this process of the operating system
+  Decides where the robots and the world of a `Sim.Fleet` run: in this process of the operating system
   (`Sim.Fleet.Local`), or each in one of its own (`Sim.Fleet.Nodes`).
 
   All callbacks run in the fleet's process. A backend turns messages into events for the fleet's

@@ -9,11 +9,11 @@ defmodule Sim.Fleet.Nodes do
   when it ends for the sixth time, so does the run.
   """
   @behaviour Sim.Fleet.Backend
+  alias Sim.Fleet.Nodes
   alias Sim.Fleet.Hardware
   alias Sim.Fleet.Nodes.{Child, Command, Host}
   alias Sim.World
   alias Sim.World.Snapshot
-  alias Sim.Fleet.Nodes.Config
   alias Sim.Node.Reporter
 
   # On a busy machine a start takes several seconds.
@@ -260,7 +260,7 @@ defmodule Sim.Fleet.Nodes do
   end
 
   defp config(backend, id) do
-    %Config{
+    %Nodes.Config{
       node: node_name(id),
       launcher: self(),
       mesh: Host.mesh(backend.host, node_name(id)),

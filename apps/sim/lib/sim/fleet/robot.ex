@@ -1,6 +1,6 @@
 defmodule Sim.Fleet.Robot do
   @moduledoc "One robot of a simulated fleet on this node: its config, its start, its claims."
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware
   alias Sim.World
@@ -19,13 +19,13 @@ defmodule Sim.Fleet.Robot do
   """
   @type common :: %{
           world: term(),
-          clock: Config.call(),
-          transport: Config.call(),
+          clock: Robot.Config.call(),
+          transport: Robot.Config.call(),
           blobs: :painted | :direct,
-          mission: Config.module_options(),
+          mission: Robot.Config.module_options(),
           plan:
             Elixir.Robot.Navigation.Grid.t() | Elixir.Robot.Navigation.OccupancyGrid.t() | nil,
-          trace: Config.call() | nil,
+          trace: Robot.Config.call() | nil,
           folder: Path.t() | nil
         }
 
@@ -37,7 +37,7 @@ defmodule Sim.Fleet.Robot do
   end
 
   @doc "A clock for robots: milliseconds since this call."
-  @spec clock() :: Config.call()
+  @spec clock() :: Robot.Config.call()
   def clock, do: {__MODULE__, :now, [System.monotonic_time(:millisecond)]}
 
   @doc "The time of such a clock."
@@ -113,7 +113,7 @@ defmodule Sim.Fleet.Robot do
   defp config(%{id: id} = robot, common) do
     device = [world: common.world, robot: id]
 
-    Config.new!(
+    Robot.Config.new!(
       [
         id: id,
         profile: robot.profile,

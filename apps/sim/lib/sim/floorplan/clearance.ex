@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Clearance do
-  @moduledoc "How far the walls of a map are from a point. Pure."
+  @moduledoc "Computes how far the walls of a map are from a point. Pure."
 
   @doc "See `Sim.Floorplan.clearance/3`."
   @spec of(Sim.Floorplan.t(), Sim.Floorplan.point(), number()) :: float()

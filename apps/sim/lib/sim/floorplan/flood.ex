@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Flood do
-  @moduledoc "What can be reached from a place by free ways of a certain width. Pure."
+  @moduledoc "Finds what can be reached from a place by free ways of a certain width. Pure."
 
   @typedoc "Numbers of cells; the nearest by way first."
   @type cells :: [non_neg_integer()]

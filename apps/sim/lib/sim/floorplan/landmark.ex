@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Landmark do
-  @moduledoc "Whether the landmark can stand at a place of a map. Pure."
+  @moduledoc "Decides whether the landmark can stand at a place of a map. Pure."
   alias Sim.Floorplan.{Clearance, Cells}
 
   @radius 0.15

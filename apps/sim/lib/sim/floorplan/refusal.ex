@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Refusal do
-  @moduledoc "What is said of a fleet for which a map has no room: what would fit. Pure."
+  @moduledoc "Words what is said of a fleet for which a map has no room: what would fit. Pure."
   alias Sim.Floorplan
   alias Sim.Floorplan.{Cells, Search}
 

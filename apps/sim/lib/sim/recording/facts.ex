@@ -1,5 +1,5 @@
 defmodule Sim.Recording.Facts do
-  @moduledoc "What a recording says of a run in words and numbers, for plots and logs. Pure."
+  @moduledoc "Describes what a recording says of a run in words and numbers, for plots and logs. Pure."
   import Mcap.Foxglove.Encode, only: [array: 2, number: 1, text: 1]
   alias Hal.{Json, Pose, Twist}
   alias Mcap.Foxglove

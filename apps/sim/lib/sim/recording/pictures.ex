@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Pictures do
   @moduledoc """
-  Which camera pictures of a run are recorded, and what is drawn on them: for people, and never an
+  Decides which camera pictures of a run are recorded, and what is drawn on them: for people, and never an
   input of a replay. Pure.
   """
   alias Hal.Frame

@@ -1,6 +1,6 @@
 defmodule Sim.Scenario.Expectation do
   @moduledoc """
-  What a scenario may expect of its run, as data. Pure; `Sim.Scenario.Check` judges it. Seconds
+  Describes what a scenario may expect of its run, as data. Pure; `Sim.Scenario.Check` judges it. Seconds
   count from the start of the run, all that is measured is true, as nobody in the run knows it.
 
   | expectation | holds if |

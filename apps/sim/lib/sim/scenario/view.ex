@@ -1,6 +1,6 @@
 defmodule Sim.Scenario.View do
   @moduledoc """
-  What expectations look at in a run: the true state of the world, and what robots claim. Pure.
+  Describes what expectations look at in a run: the true state of the world, and what robots claim. Pure.
   """
   alias Hal.Pose
   alias Robot.Mission.Runner
@@ -70,7 +70,7 @@ defmodule Sim.Scenario.View do
   end
 
   @doc "The references of those who lead."
-  @spec anchors(Trial.t()) :: [{leader :: atom(), Swarm.Formation.Reference.t()}]
+  @spec anchors(Trial.t()) :: [{leader :: atom(), Missions.Landmark.Reference.t()}]
   def anchors(trial) do
     for {id, %{phase: :lead, anchor: %{order: _} = anchor}} <- Trial.claims(trial),
         do: {id, anchor}

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Cuts do
   @moduledoc """
-  When and how a run's radio is cut. Pure. A cut is `{from_s, to_s, what}`:
+  Decides when and how a run's radio is cut. Pure. A cut is `{from_s, to_s, what}`:
 
   | what | cuts |
   |---|---|

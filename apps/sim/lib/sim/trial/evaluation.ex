@@ -4,10 +4,9 @@ defmodule Sim.Trial.Evaluation do
   the leader's true pose. Robots never see this. Pure.
   """
   alias Hal.Pose
+  alias Missions.Landmark.{Claim, Reference, SlotPoses}
   alias Sim.{Scene, World}
   alias Sim.Trial.{AgreementMetrics, Claims, RunLog, Setup, Stuck}
-  alias Swarm.Formation
-  alias Swarm.Formation.Reference
 
   @typedoc "A run at one moment; `claims` are those of the living robots."
   @type run :: %{
@@ -39,7 +38,7 @@ defmodule Sim.Trial.Evaluation do
           slot: slot && Pose.point(slot),
           leader?: id == leader,
           uncertainty: claim[:uncertainty],
-          size_ppm: size(claim)
+          size_ppm: claim && Claim.size(claim)
         }
       end
 
@@ -154,27 +153,12 @@ defmodule Sim.Trial.Evaluation do
         distance = if landmark, do: Pose.distance(pose, landmark), else: 1.6
 
         anchor
-        |> true_slots(pose, distance)
+        |> SlotPoses.intended(pose, distance)
         |> Enum.zip(anchor.order)
         |> Map.new(fn {{place, slot}, id} -> {id, {place, slot}} end)
 
       _no_anchor ->
         %{}
-    end
-  end
-
-  # The slots as the leader intends them, relative to its true pose.
-  defp true_slots(%Reference{trail: nil} = anchor, pose, distance) do
-    slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
-    for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}
-  end
-
-  defp true_slots(%Reference{trail: trail, pose: {x, y, heading}}, pose, _distance) do
-    believed = Pose.new(x / 1000, y / 1000, heading / 1000)
-
-    for {{sx, sy, sh}, place} <- Enum.with_index(trail, 1) do
-      slot = Pose.relative(believed, Pose.new(sx / 1000, sy / 1000, sh / 1000))
-      {place, Pose.compose(pose, slot)}
     end
   end
 
@@ -193,12 +177,5 @@ defmodule Sim.Trial.Evaluation do
   end
 
   defp state(nil), do: :dead
-  defp state(%{blocked: true}), do: :blocked
-  defp state(%{phase: :follow, in_place: true}), do: :in_place
-  defp state(%{phase: :follow, unsure: true}), do: :unsure
-  defp state(%{phase: phase}), do: phase
-  defp state(_new), do: :idle
-
-  defp size(%{sight: %{size_ppm: size}}), do: size
-  defp size(_blind), do: nil
+  defp state(claim), do: Claim.state(claim)
 end

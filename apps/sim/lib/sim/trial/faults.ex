@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Faults do
   @moduledoc """
-  What robots of a run lack for a time: their processor, their camera, their ears. Pure; times in
+  Describes what robots of a run lack for a time: their processor, their camera, their ears. Pure; times in
   milliseconds.
   """
 

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Mechanics do
   @moduledoc """
-  What moves the world of a run, senses it, and judges the fleet in it; the same for a run
+  Describes what moves the world of a run, senses it, and judges the fleet in it; the same for a run
   (`Sim.Trial`) and for its replay (`Sim.Replay`). Pure.
   """
   alias Hal.Twist

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Script do
   @moduledoc """
-  What is done to a run and when: moves of the landmark, kills, and all other events
+  Describes what is done to a run and when: moves of the landmark, kills, and all other events
   (`Sim.Trial.Event`). Pure; times in milliseconds.
   """
   alias Sim.Trial.Event

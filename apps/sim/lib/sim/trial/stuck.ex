@@ -50,10 +50,7 @@ defmodule Sim.Trial.Stuck do
   def report(stuck), do: Enum.reverse(stuck.told)
 
   # A robot that was stopped claims nothing.
-  defp silent?(%{phase: :follow, in_place: in_place?, unsure: unsure?, blocked: blocked?}),
-    do: not (in_place? or unsure? or blocked?)
-
-  defp silent?(_claim), do: false
+  defp silent?(claim), do: Missions.Landmark.Claim.state(claim) == :follow
 
   defp go_on(nil, row, at_ms), do: begin(row, at_ms)
 

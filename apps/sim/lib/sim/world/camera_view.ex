@@ -1,6 +1,6 @@
 defmodule Sim.World.CameraView do
   @moduledoc """
-  What a camera needs to know about a world, in two parts: the static ground, sent once, and what
+  Describes what a camera needs to know about a world, in two parts: the static ground, sent once, and what
   moves, a few numbers per robot. Pure.
 
   The map is most of a world's size. A hundred cameras look ten times a second, and some of them

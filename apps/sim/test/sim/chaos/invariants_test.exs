@@ -6,7 +6,7 @@ defmodule Sim.Chaos.InvariantsTest do
   alias Sim.Chaos.Invariants.{Leaders, Limits, Slots, Stops}
   alias Sim.{Trial, World}
   alias Swarm.EStop
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
 
   doctest Sim.Chaos.Violation
   doctest Sim.Chaos.Invariants.Leaders
@@ -87,7 +87,7 @@ defmodule Sim.Chaos.InvariantsTest do
     end
 
     test "nobody leads, although somebody sees the landmark" do
-      seen = [agree(:mag1, %{size_ppm: 9}), agree(:mag2, nil), agree(:mag3, nil)]
+      seen = [agree(:mag1, %{merit: 9}), agree(:mag2, nil), agree(:mag3, nil)]
       judge = Leaders.new(options())
 
       assert {%Violation{invariant: :no_leader, at_ms: 45_200}, _judge} =

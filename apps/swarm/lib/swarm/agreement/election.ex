@@ -3,23 +3,24 @@ defmodule Swarm.Agreement.Election do
   Elects the leader: a pure function of the committed record, so that all robots get the same
   answer.
 
-  Among those that found the landmark, the one that sees it largest wins (R48); ties go to the
-  first name. If two or more leaders report, parts of a fleet have met, and the one with the
-  highest {robots led, size, name} leads all: the fewest have to turn to another.
+  Among those that may lead at all, the one of the greatest merit wins (R48: the landmark mission's
+  is how large a robot sees the landmark); ties go to the first name. If two or more leaders report,
+  parts of a fleet have met, and the one with the highest {robots led, merit, name} leads all: the
+  fewest have to turn to another.
 
   Under the policy `:majority` (`of` is the fleet's size) nobody leads a view that is not more than
   half of the fleet.
   """
 
   @typedoc """
-  What a robot reported in a round; `nil` if it was silent until the deadline. `led` is how many
+  What a robot reported in a round; `nil` if it was silent until the deadline. `merit` says how well
+  it would lead, in millionths, by the measure of its mission; `nil`: not at all. `led` is how many
   robots it leads including itself, 0 if it leads nobody; `of` is the size of the fleet of which
   only a majority may lead, 0 under the policy `:available`.
   """
   @type report ::
           %{
-            found: boolean(),
-            size_ppm: non_neg_integer(),
+            merit: 0..1_000_000 | nil,
             pose: {integer(), integer(), integer()},
             led: non_neg_integer(),
             of: non_neg_integer()
@@ -27,14 +28,14 @@ defmodule Swarm.Agreement.Election do
           | nil
 
   @doc """
-  The leader; `:nobody` if none found the landmark, `:minority` if the view may not lead.
+  The leader; `:nobody` if none may, `:minority` if the view may not lead.
 
-      iex> one = %{found: true, size_ppm: 900, pose: {0, 0, 0}, led: 0, of: 0}
-      iex> Swarm.Agreement.Election.leader(%{mag1: one, mag2: one, min1: %{one | found: false}, min2: nil})
+      iex> one = %{merit: 900, pose: {0, 0, 0}, led: 0, of: 0}
+      iex> Swarm.Agreement.Election.leader(%{mag1: one, mag2: one, min1: %{one | merit: nil}, min2: nil})
       {:ok, :mag1}
       iex> Swarm.Agreement.Election.leader(%{min2: nil})
       :nobody
-      iex> Swarm.Agreement.Election.leader(%{mag1: one, mag2: %{one | led: 2}, min1: %{one | led: 3, size_ppm: 5}})
+      iex> Swarm.Agreement.Election.leader(%{mag1: one, mag2: %{one | led: 2}, min1: %{one | led: 3, merit: 5}})
       {:ok, :min1}
       iex> Swarm.Agreement.Election.leader(%{mag1: %{one | of: 4}, mag2: %{one | of: 4}})
       :minority
@@ -46,7 +47,7 @@ defmodule Swarm.Agreement.Election do
     cond do
       not enough?(map_size(reports), fleet(reports)) -> :minority
       Enum.count(present, &leads?/1) >= 2 -> {:ok, merge(present)}
-      true -> largest(present)
+      true -> best(present)
     end
   end
 
@@ -82,18 +83,15 @@ defmodule Swarm.Agreement.Election do
     {id, _report} =
       present
       |> Enum.filter(&leads?/1)
-      |> Enum.max_by(fn {id, report} -> {report.led, size(report), id} end)
+      |> Enum.max_by(fn {id, report} -> {report.led, report.merit || 0, id} end)
 
     id
   end
 
-  defp size(%{found: true, size_ppm: size}), do: size
-  defp size(_blind), do: 0
-
-  defp largest(present) do
+  defp best(present) do
     present
-    |> Enum.filter(fn {_id, report} -> report.found end)
-    |> Enum.min_by(fn {id, report} -> {-report.size_ppm, id} end, fn -> nil end)
+    |> Enum.filter(fn {_id, report} -> report.merit != nil end)
+    |> Enum.min_by(fn {id, report} -> {-report.merit, id} end, fn -> nil end)
     |> case do
       nil -> :nobody
       {id, _report} -> {:ok, id}

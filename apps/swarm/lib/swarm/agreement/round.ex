@@ -15,7 +15,8 @@ defmodule Swarm.Agreement.Round do
   Ids are `{epoch, counter, initiator}`: the epoch is that of the leadership which the round will
   found, the counter grows with each new try.
   """
-  alias Swarm.Agreement.Round.{Epochs, Letter, Precedence, Record, Tally}
+  alias Swarm.Agreement.Round
+  alias Swarm.Agreement.Round.{Epochs, Letter, Precedence, Tally}
   alias Swarm.Wire.CounterGuard
 
   # Letters are repeated every 100 ms, less often in a large group, because all-to-all traffic
@@ -134,7 +135,7 @@ defmodule Swarm.Agreement.Round do
   `{:commit, record}` is returned once. `{:failed, :mismatch | :timeout}` asks for a new round.
   """
   @spec tick(t(), integer()) ::
-          {t(), [Letter.t()], nil | {:commit, Record.t()} | {:failed, :mismatch | :timeout}}
+          {t(), [Letter.t()], nil | {:commit, Round.Record.t()} | {:failed, :mismatch | :timeout}}
   def tick(%{phase: :none} = round, _now_ms), do: {round, [], nil}
 
   def tick(round, now_ms) do
@@ -216,7 +217,7 @@ defmodule Swarm.Agreement.Round do
   defp advance(round, _now_ms), do: round
 
   defp freeze(round, now_ms) do
-    digest = Record.digest(round.id, Record.freeze(round.view, round.reports))
+    digest = Round.Record.digest(round.id, Round.Record.freeze(round.view, round.reports))
 
     %{
       round

@@ -1,6 +1,6 @@
 defmodule Swarm.Blackboard.Expiry do
   @moduledoc """
-  Which rows a board forgets once they are ten minutes old: robots of which nothing is newer,
+  Decides which rows a board forgets once they are ten minutes old: robots of which nothing is newer,
   words of former lives, and deleted hints; words of this life of this node's own robots never.
   Pure.
   """

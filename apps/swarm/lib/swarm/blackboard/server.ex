@@ -1,6 +1,6 @@
 defmodule Swarm.Blackboard.Server do
   @moduledoc """
-  The process of `Swarm.Blackboard`: keeps the rows, and a table for readers; pushes what is
+  Runs the process of `Swarm.Blackboard`: keeps the rows, and a table for readers; pushes what is
   written here, stores what arrives, and repairs what was lost.
   """
   use GenServer

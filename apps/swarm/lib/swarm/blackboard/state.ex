@@ -1,6 +1,6 @@
 defmodule Swarm.Blackboard.State do
   @moduledoc """
-  What all robots publish about themselves, as one node knows it:
+  Holds what all robots publish about themselves, as one node knows it:
   `{robot, key} -> {incarnation, sequence, value}`. Each row has one writer, the robot itself, and
   the newest `{incarnation, sequence}` wins, so that rows may arrive late, twice, in any order and
   through third parties. Besides rows there are hints, which all robots write (`put_hint/5`).

@@ -23,7 +23,7 @@ defmodule Swarm.Comms.CommandHandler do
   robot cannot reach by what it knows of walls is refused, too (`Robot.Navigation.Reach`).
   """
   alias Hal.{Device, Pose}
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Control.{Delivery, Pilot}
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
@@ -44,7 +44,7 @@ defmodule Swarm.Comms.CommandHandler do
   Handles a request that was made at `asked` (`System.monotonic_time/1`, microseconds). The
   process behind `ref` gets the outcome (`Mesh.Nonblocking.answer/2`).
   """
-  @spec take(term(), {reference(), asked :: integer()}, Config.t(), Board.t(), Receiver.t()) ::
+  @spec take(term(), {reference(), asked :: integer()}, Robot.Config.t(), Board.t(), Receiver.t()) ::
           :ok
   def take(request, {ref, asked}, config, board, receiver) do
     config = Replacement.config(config, board)
@@ -178,7 +178,7 @@ defmodule Swarm.Comms.CommandHandler do
   end
 
   defp possible({:follow_the_leader, leader}, %{id: id} = config, _board, receiver),
-    do: Order.follow(id, leader, Receiver.leaders(receiver, Config.now(config)))
+    do: Order.follow(id, leader, Receiver.leaders(receiver, Robot.Config.now(config)))
 
   defp possible({:find_blob, colour}, config, _board, _receiver), do: known(colour, config)
   defp possible(_request, _config, _board, _receiver), do: :ok

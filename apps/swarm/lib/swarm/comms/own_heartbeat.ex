@@ -2,7 +2,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   @moduledoc """
   Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   """
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
@@ -15,7 +15,13 @@ defmodule Swarm.Comms.OwnHeartbeat do
   has no heartbeat; one whose executive crashed stands where it was. One whose mission has decided
   nothing for a second, for example because it was frozen, does not claim to lead.
   """
-  @spec message(Config.t(), Board.t(), Receiver.t(), {integer(), non_neg_integer()}, integer()) ::
+  @spec message(
+          Robot.Config.t(),
+          Board.t(),
+          Receiver.t(),
+          {integer(), non_neg_integer()},
+          integer()
+        ) ::
           {:ok, Message.t()} | :error
   def message(config, board, receiver, sender, at_ms) do
     with {:ok, pose, _then} <- Board.fetch(board, :pose, :infinity, at_ms) do

@@ -3,15 +3,15 @@ defmodule Swarm.Comms.PingReply do
   A robot's answer to `ping` (R16): its name, how long it has been up, and its state and for how
   long. Pure, except for `line/3`, which reads the robot's board.
   """
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Swarm.Status
 
   @minute_ms 60_000
 
   @doc "The answer of a robot of this node with this status."
-  @spec line(Config.t(), Board.t(), Status.t()) :: String.t()
+  @spec line(Robot.Config.t(), Board.t(), Status.t()) :: String.t()
   def line(config, board, %Status{} = status) do
-    now_ms = Config.now(config)
+    now_ms = Robot.Config.now(config)
     {:ok, %{since_ms: since_ms}, _at_ms} = Board.fetch(board, :mission, :infinity)
     words(status, now_ms - board.since_ms, now_ms - since_ms)
   end

@@ -4,7 +4,7 @@ defmodule Swarm.Comms.Sender do
   stop changes, one at once and then ten a second for a second, so that the change spreads within
   200 ms.
   """
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Swarm.{EStop, Message}
   alias Swarm.Comms.OwnHeartbeat
   alias Swarm.Message.Receiver
@@ -21,9 +21,9 @@ defmodule Swarm.Comms.Sender do
   stop, `urgent` how many faster heartbeats are left.
   """
   @type t :: %__MODULE__{
-          config: Config.t(),
+          config: Robot.Config.t(),
           board: Board.t(),
-          transport: Config.call(),
+          transport: Robot.Config.call(),
           boot: integer(),
           held: [EStop.State.tag()],
           sequence: non_neg_integer(),
@@ -35,7 +35,7 @@ defmodule Swarm.Comms.Sender do
         }
 
   @doc "The state before anything is sent, in the life of this number."
-  @spec new(Config.t(), Board.t(), Config.call(), boot :: integer()) :: t()
+  @spec new(Robot.Config.t(), Board.t(), Robot.Config.call(), boot :: integer()) :: t()
   def new(config, board, transport, boot),
     do: %__MODULE__{
       config: config,
@@ -68,7 +68,7 @@ defmodule Swarm.Comms.Sender do
   def urge(%__MODULE__{} = sender, receiver) do
     case notice(sender) do
       ^sender -> sender
-      hurried -> beat(hurried, receiver, Config.now(sender.config))
+      hurried -> beat(hurried, receiver, Robot.Config.now(sender.config))
     end
   end
 

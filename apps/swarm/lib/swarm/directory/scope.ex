@@ -1,6 +1,6 @@
 defmodule Swarm.Directory.Scope do
   @moduledoc """
-  The process of `Swarm.Directory`: a scope of `:pg`, which other nodes must be able to send to by
+  Runs the process of `Swarm.Directory`: a scope of `:pg`, which other nodes must be able to send to by
   its name, and which must not end because of what they send (`Hal.HardenedServer`).
 
   OTP's code does the work, and only gets messages of its own protocol that are whole:

@@ -17,7 +17,7 @@ defmodule Swarm.Discovery.RobotInfo do
 
   Names travel as text, and stay text if this node has no such atom.
   """
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Robot.Safety.LivenessMonitor
   alias Swarm.{Blackboard, Status}
   alias Swarm.Wire
@@ -59,7 +59,8 @@ defmodule Swarm.Discovery.RobotInfo do
   Writes a robot's rows `:about` and `:status` if it is time or something changed; called at each
   tick of its comms process. Waits for nothing.
   """
-  @spec note(noted(), Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) :: noted()
+  @spec note(noted(), Robot.Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) ::
+          noted()
   def note(noted, config, board, boot, receiver) do
     health = Board.health(board, :drive)
     hung = for part <- LivenessMonitor.parts(), do: Board.fetch(board, {:hung, part}, :infinity)

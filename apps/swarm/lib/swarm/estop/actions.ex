@@ -4,7 +4,7 @@ defmodule Swarm.EStop.Actions do
   the stop, and spreads it.
   """
   alias Hal.Device
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
   alias Mesh.Nonblocking
@@ -23,7 +23,7 @@ defmodule Swarm.EStop.Actions do
   the last reset that was carried out was given (both monotonic, microseconds).
   """
   @type t :: %{
-          :config => Config.t(),
+          :config => Robot.Config.t(),
           :id => atom(),
           :board => Board.t(),
           :stop => EStop.State.t(),
@@ -107,7 +107,7 @@ defmodule Swarm.EStop.Actions do
 
   def obey(s, :estop, {ref, _given_us}) do
     s = press(s)
-    EStop.Answer.stood(s.id, ref)
+    EStop.Answer.held(s.id, ref)
     s
   end
 
@@ -115,7 +115,7 @@ defmodule Swarm.EStop.Actions do
     s = called(s, call, 0)
 
     if EStop.State.held?(s.stop),
-      do: EStop.Answer.stood(s.id, ref),
+      do: EStop.Answer.held(s.id, ref),
       else: Nonblocking.answer(ref, {:error, "#{s.id} was reset meanwhile"})
 
     s
@@ -199,7 +199,7 @@ defmodule Swarm.EStop.Actions do
   defp halt(%{id: id} = s, then) do
     # Requests from before this stop begin nothing after it (`Swarm.Order.Freshness`,
     # `Robot.Control.Pilot`).
-    Board.put(s.board, :estop, :stopped, now_us(), Config.now(s.config))
+    Board.put(s.board, :estop, :stopped, now_us(), Robot.Config.now(s.config))
     :ok = Pilot.halt_at_once(id, then)
   end
 
@@ -258,14 +258,14 @@ defmodule Swarm.EStop.Actions do
   @doc "Records the state of the stop."
   @spec write(t()) :: t()
   def write(s) do
-    Board.put(s.board, :estop, :estop, s.stop, Config.now(s.config))
+    Board.put(s.board, :estop, :estop, s.stop, Robot.Config.now(s.config))
     s
   end
 
   @doc "Records which press of the gate's button was followed."
   @spec record(t()) :: t()
   def record(s) do
-    Board.put(s.board, :estop, :followed, s.presses, Config.now(s.config))
+    Board.put(s.board, :estop, :followed, s.presses, Robot.Config.now(s.config))
     s
   end
 end

@@ -18,28 +18,59 @@ defmodule Swarm.EStop.Answer do
 
   # Its base reports ten times a second; the caller waits for half a second (`Swarm.Commands.Client`).
   @report_ms 300
+  @saved_ms 400
 
   @doc """
-  Called by the gate when the robot's mission or order has ended and the gate has stopped, or by the e-stop process when
-  it has latched the gate: answers whether the wheels were told, which their next report shows. Waits for nobody.
+  Called by the gate when the robot's mission or order has ended and the gate has stopped: answers whether the wheels
+  were told, which their next report shows. Waits for nobody.
   """
   @spec stood(atom(), reference()) :: :ok
-  def stood(robot, ref) do
+  def stood(robot, ref), do: confirm(robot, {Nonblocking, :answer, [ref]})
+
+  @doc """
+  The same by the e-stop process (the caller) when it has latched the gate: `:ok` also says that the latch is in its
+  file, if it has one. If the disk takes too long, `{:unsaved, ref}` comes to the e-stop process in time for `unsaved/3`.
+  """
+  @spec held(atom(), reference()) :: :ok
+  def held(robot, ref) do
+    Process.send_after(self(), {:unsaved, ref}, @saved_ms)
+    confirm(robot, {__MODULE__, :save, [robot, ref]})
+  end
+
+  @doc "Answers an e-stop, as soon as its file is written if the answer is `:ok`."
+  @spec save(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
+  def save(robot, ref, :ok),
+    do: Board.saved(Board.find!(robot), {Nonblocking, :answer, [ref, :ok]})
+
+  def save(_robot, ref, error), do: Nonblocking.answer(ref, error)
+
+  @doc "Answers an e-stop whose file is not written yet; nobody hears it after another answer."
+  @spec unsaved(atom(), Board.t(), reference()) :: :ok
+  def unsaved(robot, board, ref) do
+    why =
+      "its disk has not taken the e-stop yet, which would not survive a restart of the machine"
+
+    if Board.saved?(board),
+      do: :ok,
+      else: Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
+  end
+
+  defp confirm(robot, {m, f, a} = then) do
     case {stopped(robot), Names.whereis(robot, :drive)} do
-      {:ok, nil} -> Nonblocking.answer(ref, {:error, line(robot, "its drive is starting again")})
-      {:ok, drive} -> Device.confirm(drive, @report_ms, {__MODULE__, :told, [robot, ref]})
-      {error, _drive} -> Nonblocking.answer(ref, error)
+      {:ok, nil} -> apply(m, f, a ++ [{:error, line(robot, "its drive is starting again")}])
+      {:ok, drive} -> Device.confirm(drive, @report_ms, {__MODULE__, :told, [robot, then]})
+      {error, _drive} -> apply(m, f, a ++ [error])
     end
   end
 
-  @doc "Called by the drive: answers a stop by what the drive has heard of its base since."
-  @spec told(atom(), reference(), Device.Confirmation.outcome()) :: :ok
-  def told(robot, ref, :silent) do
+  @doc "Called by the drive: hands on an answer to a stop, by what the drive has heard of its base since."
+  @spec told(atom(), Robot.Config.call(), Device.Confirmation.outcome()) :: term()
+  def told(robot, {m, f, a}, :silent) do
     why = "its base has not reported its wheels for #{@report_ms} ms since"
-    Nonblocking.answer(ref, {:error, line(robot, why)})
+    apply(m, f, a ++ [{:error, line(robot, why)}])
   end
 
-  def told(robot, ref, _reported_or_closed), do: Nonblocking.answer(ref, stopped(robot))
+  def told(robot, {m, f, a}, _reported_or_closed), do: apply(m, f, a ++ [stopped(robot)])
 
   defp line(robot, why) do
     "#{robot}: its gate stands, but #{why}: nobody can say whether its wheels do; " <>

@@ -1,10 +1,10 @@
 defmodule Swarm.EStop.Server do
   @moduledoc """
-  The process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
+  Runs the process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
   """
   use GenServer
   alias Hal.HardenedServer
-  alias Robot.{Board, Config, Names}
+  alias Robot.{Board, Names}
   alias Robot.Safety.Gate
   alias Swarm.EStop
   alias Mesh.Nonblocking
@@ -13,7 +13,7 @@ defmodule Swarm.EStop.Server do
   alias Swarm.Wire.StopTags
 
   @impl GenServer
-  def init(%Config{id: id} = config) do
+  def init(%Robot.Config{id: id} = config) do
     board = Board.find!(id)
     {stop, presses} = EStop.Actions.begin(board)
 
@@ -116,6 +116,11 @@ defmodule Swarm.EStop.Server do
   def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
+  def handle_info({:unsaved, ref}, s) when is_reference(ref) do
+    EStop.Answer.unsaved(s.id, s.board, ref)
+    {:noreply, s}
+  end
+
   def handle_info(message, s) do
     case {Directory.Membership.arrived(s.group, message),
           Directory.Membership.arrived(s.name, message)} do

@@ -24,17 +24,17 @@ defmodule Swarm.Formation.FreeSlots do
       {5, [1, 3, 4]}
   """
   @spec places(Formation.t(), non_neg_integer(), Pose.t(), float(), [tuple()], float()) :: t()
-  def places(formation, followers, pose, landmark_distance, bodies, radius),
-    do: places(formation, followers, pose, landmark_distance, &free?(&1, bodies, radius))
+  def places(formation, followers, pose, distance, bodies, radius),
+    do: places(formation, followers, pose, distance, &free?(&1, bodies, radius))
 
   @doc "The same, where a function says of a pose whether a robot can stand there."
   @spec places(Formation.t(), non_neg_integer(), Pose.t(), float(), (Pose.t() -> boolean())) ::
           t()
-  def places(formation, followers, pose, landmark_distance, free?) do
+  def places(formation, followers, pose, distance, free?) do
     Enum.find_value(followers..(followers + @most), whole(followers), fn slots ->
       free =
         formation
-        |> Formation.slots(slots + 1, landmark_distance)
+        |> Formation.slots(slots + 1, distance)
         |> Enum.with_index(1)
         |> Enum.filter(fn {slot, _k} -> free?.(Pose.compose(pose, slot)) end)
 

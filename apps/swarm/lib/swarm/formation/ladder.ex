@@ -11,7 +11,7 @@ defmodule Swarm.Formation.Ladder do
   | `:cluster` | the nearest free places round the leader, behind one another where they must be |
 
   Each robot of a shape can drive straight from its place to the leader's, or to that of a robot before it, so that no shape
-  extends behind a wall; and none stands between the leader and the landmark.
+  extends behind a wall; and none stands between the leader and what it faces.
   """
   alias Hal.Pose
   alias Swarm.Formation
@@ -20,7 +20,7 @@ defmodule Swarm.Formation.Ladder do
   @rungs [:asked, :turned, :closer, :column, :cluster]
   @turns for k <- 1..12, sign <- [1, -1], k != 12 or sign == 1, do: sign * k * :math.pi() / 12
   @closer 0.1
-  # The half of the angle in which nobody may stand before the leader, and how far beyond the landmark.
+  # The half of the angle in which nobody may stand before the leader, and how far beyond what it faces.
   @ahead 0.5
   @beyond 0.4
   # Places are looked for along a trail in steps of this share of the spacing, and up to this many.
@@ -44,7 +44,7 @@ defmodule Swarm.Formation.Ladder do
         }
 
   @typedoc """
-  Where the leader is, how far ahead of it the landmark stands (metres), and where it came from.
+  Where the leader is, how far ahead of it stands what it faces (metres), and where it came from.
   """
   @type here :: %{pose: Pose.t(), distance: float(), trail: Trail.t()}
 
@@ -79,7 +79,7 @@ defmodule Swarm.Formation.Ladder do
     if Enum.all?(spots, fits?) and linked?(spots, here, space), do: {asked, room, nil}
   end
 
-  # A ring is about the landmark.
+  # A ring is about what the leader faces.
   defp rung(rung, {:circle, _spacing}, _followers, _here, _space) when rung in [:turned, :closer],
     do: nil
 

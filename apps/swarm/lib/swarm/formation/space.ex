@@ -1,6 +1,6 @@
 defmodule Swarm.Formation.Space do
   @moduledoc """
-  Where robots of a size can stand: beside bodies that stay where they are, and clear of the walls that the leader knows
+  Decides where robots of a size can stand: beside bodies that stay where they are, and clear of the walls that the leader knows
   (`Robot.Navigation.Grid`, `nil` for none). Pure; metres, in the frame of the map.
   """
   alias Hal.Pose

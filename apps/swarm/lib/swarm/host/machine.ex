@@ -1,6 +1,6 @@
 defmodule Swarm.Host.Machine do
   @moduledoc """
-  What a machine lacks for a robot's network, for `robot check`: its interface is absent, or its own name is in no hosts
+  Finds what a machine lacks for a robot's network, for `robot check`: its interface is absent, or its own name is in no hosts
   file. Neither keeps a robot from starting.
   """
   alias Mesh.Interface

@@ -1,6 +1,6 @@
 defmodule Swarm.Membership.Heartbeat do
   @moduledoc """
-  What a robot tells all others five times a second: its pose and speed, the robots that it hears, the one that it follows,
+  Describes what a robot tells all others five times a second: its pose and speed, the robots that it hears, the one that it follows,
   what it does, and what its mission claims. Whole numbers only: mm, mrad, mm/s, mrad/s.
 
   `boot` is the number of its life, which grows with every start. `estop` has the tags of the emergency stops that hold it

@@ -1,6 +1,6 @@
 defmodule Swarm.Membership.Matrix do
   @moduledoc """
-  Which robot hears which. In `iex` it prints as a table, with a line for each robot and a column
+  Shows which robot hears which. In `iex` it prints as a table, with a line for each robot and a column
   for each robot that it may hear:
 
       #Swarm.Membership.Matrix, 3 robots

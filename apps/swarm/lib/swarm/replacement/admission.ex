@@ -1,10 +1,11 @@
 defmodule Swarm.Replacement.Admission do
   @moduledoc """
-  Whether an order is carried out: by whom it is signed, and for when; whether its robots allow it now; whether its code may
+  Decides whether an order is carried out: by whom it is signed, and for when; whether its robots allow it now; whether its code may
   come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
   """
+  alias Swarm.Replacement
   alias Robot.Names
-  alias Swarm.Replacement.{Code, Entries, Job, Order}
+  alias Swarm.Replacement.{Entries, Job, Order}
 
   @watch_s div(Job.watch_ms(), 1_000)
 
@@ -50,15 +51,20 @@ defmodule Swarm.Replacement.Admission do
   end
 
   @doc "Which robots of this node it is for, and what it brings, if all of that may be now."
-  @spec admit(Order.t(), [job()], loaded :: Code.store(), kept :: Code.store()) ::
-          {:ok, [atom()], module(), [{module(), binary()}], Code.earlier()}
+  @spec admit(
+          Order.t(),
+          [job()],
+          loaded :: Replacement.Code.store(),
+          kept :: Replacement.Code.store()
+        ) ::
+          {:ok, [atom()], module(), [{module(), binary()}], Replacement.Code.earlier()}
           | {:error, line :: String.t()}
   def admit(order, jobs, loaded, kept) do
     robots = Entries.meant(order)
     busy = Enum.filter(jobs, &busy?/1)
 
     with :ok <- each(robots, &free(&1, busy)),
-         {:ok, module, modules, earlier} <- Code.check(order, loaded, kept),
+         {:ok, module, modules, earlier} <- Replacement.Code.check(order, loaded, kept),
          :ok <- alone(Keyword.keys(modules), robots, busy),
          do: {:ok, robots, module, modules, earlier}
   end

@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Code do
   @moduledoc """
-  Which code an order may bring, and its way into the node and out again.
+  Decides which code an order may bring, and its way into the node and out again.
 
   An order may bring a mission (`Robot.Mission`) and modules below its name, `Ours.Gather` and `Ours.Gather.Circle`.
   Each must be one that this node does not have, or belong to an application in which missions live

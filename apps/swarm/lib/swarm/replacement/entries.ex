@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Entries do
   @moduledoc """
-  What `Swarm.Replacement.Server` reads on the boards of its node's robots, and what it writes there for people. A robot
+  Describes what `Swarm.Replacement.Server` reads on the boards of its node's robots, and what it writes there for people. A robot
   that has just ended has no entries.
   """
   alias Hal.Event

@@ -1,15 +1,16 @@
 defmodule Swarm.Replacement.Server do
   @moduledoc """
-  The process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
+  Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
   the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
   its successor brings back the release.
   """
   use GenServer
+  alias Swarm.Replacement
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Nonblocking, Secret}
   alias Robot.{Mission, Names}
   alias Robot.Control.{Delivery, Pilot}
-  alias Swarm.Replacement.{Admission, Code, Entries, Job, Order}
+  alias Swarm.Replacement.{Admission, Entries, Job, Order}
 
   @tick_ms 50
   @start_ms 2_000
@@ -77,9 +78,9 @@ defmodule Swarm.Replacement.Server do
       Entries.forget(robot, "#{inspect(__MODULE__)} was started again")
     end
 
-    if left != [], do: Code.revert()
+    if left != [], do: Replacement.Code.revert()
     allowed? = Enum.any?(Names.robots(), &(Entries.allowed(&1) == :ok))
-    {:noreply, if(allowed?, do: %{s | kept: Code.keep()}, else: s)}
+    {:noreply, if(allowed?, do: %{s | kept: Replacement.Code.keep()}, else: s)}
   end
 
   @impl GenServer
@@ -91,7 +92,7 @@ defmodule Swarm.Replacement.Server do
 
   @impl GenServer
   def handle_cast(:keep, %{kept: kept} = s) when kept == %{},
-    do: {:noreply, %{s | kept: Code.keep()}}
+    do: {:noreply, %{s | kept: Replacement.Code.keep()}}
 
   def handle_cast(:keep, s), do: {:noreply, s}
 
@@ -230,7 +231,7 @@ defmodule Swarm.Replacement.Server do
   end
 
   defp effect(:load, id, %{modules: modules, earlier: earlier}, s) do
-    result = Code.load(modules)
+    result = Replacement.Code.load(modules)
 
     s =
       if result == :ok,
@@ -334,7 +335,7 @@ defmodule Swarm.Replacement.Server do
   end
 
   defp restore(earlier, s) do
-    Code.restore(earlier)
+    Replacement.Code.restore(earlier)
     back = for {module, beam} <- earlier, s.release[module] == beam, do: module
     now = for {module, beam} <- earlier, is_binary(beam), module not in back, do: {module, beam}
 

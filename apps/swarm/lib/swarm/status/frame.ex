@@ -7,7 +7,6 @@ defmodule Swarm.Status.Frame do
   own pose is in it as well. `start` (metres) is where it was switched on, by its file.
   """
   alias Hal.Pose
-  alias Robot.Config
   alias Swarm.Blackboard
   alias Swarm.Wire
 
@@ -24,7 +23,7 @@ defmodule Swarm.Status.Frame do
   The frame of a pose with this uncertainty (`t:Robot.Percept.uncertainty/0`); `:lost` of a robot that was started again
   on its way and does not know where it is, `nil` without a pose.
   """
-  @spec of(Config.t(), map() | nil) :: t() | :lost | nil
+  @spec of(Robot.Config.t(), map() | nil) :: t() | :lost | nil
   def of(_config, nil), do: nil
   def of(_config, %{lost?: true}), do: :lost
 

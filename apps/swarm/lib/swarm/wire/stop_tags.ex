@@ -1,6 +1,6 @@
 defmodule Swarm.Wire.StopTags do
   @moduledoc """
-  What a heartbeat says of the emergency stops that hold its robot: their tags (`Swarm.EStop.State`), at most 16. Pure.
+  Describes what a heartbeat says of the emergency stops that hold its robot: their tags (`Swarm.EStop.State`), at most 16. Pure.
   """
 
   @most 16

@@ -91,7 +91,7 @@ defmodule Swarm.Agreement.RoundTest do
   end
 
   defp report(id),
-    do: %{found: true, size_ppm: :erlang.phash2(id), pose: {1, 2, 3}, led: 0, of: 0}
+    do: %{merit: :erlang.phash2(id), pose: {1, 2, 3}, led: 0, of: 0}
 
   defp update(state, id, function),
     do: %{state | members: Map.update!(state.members, id, function)}
@@ -167,10 +167,10 @@ defmodule Swarm.Agreement.RoundTest do
     other = Round.open(Round.new(:mag2), 1, [:mag1, :mag2], :search, @length, 0)
     {other, [letter], nil} = Round.tick(other, 0)
     round = Round.hear(round, :mag2, letter, 0)
-    first = %{found: true, size_ppm: 1, pose: {0, 0, 0}, led: 0, of: 0}
+    first = %{merit: 1, pose: {0, 0, 0}, led: 0, of: 0}
     round = Round.hear(round, :mag2, %{letter | report: first}, 10)
-    round = Round.hear(round, :mag2, %{letter | report: %{first | size_ppm: 2}}, 20)
-    assert round.reports.mag2.size_ppm == 1
+    round = Round.hear(round, :mag2, %{letter | report: %{first | merit: 2}}, 20)
+    assert round.reports.mag2.merit == 1
     assert other.id == round.id
   end
 

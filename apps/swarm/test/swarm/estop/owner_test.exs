@@ -38,6 +38,30 @@ defmodule Swarm.EStop.OwnerTest do
     :ok = :sys.resume(comms)
   end
 
+  @tag :tmp_dir
+  test "an e-stop is confirmed once it is on the disk, and a disk that hangs is named", %{
+    tmp_dir: folder
+  } do
+    file = Path.join(folder, "estop")
+    id = robot(:owner_disk, estop_file: file)
+    assert Swarm.ask(id, :estop) == :ok
+    assert File.exists?(file)
+    assert Swarm.ask(id, :reset) == :ok
+    eventually(fn -> not File.exists?(file) end)
+
+    Robot.Case.hang(file)
+    assert {:error, line} = Swarm.ask(id, :estop)
+    assert line =~ "#{id} is held, but its disk has not taken the e-stop yet"
+    assert latched?(id)
+    # Neither its owner nor its gate waits for the disk.
+    assert Swarm.ask(id, :reset) == :ok
+    refute latched?(id)
+    Robot.Case.resume(file)
+    eventually(fn -> not File.exists?(file) end)
+    assert Swarm.ask(id, :estop) == :ok
+    assert File.read!(file) == "e-stop\n"
+  end
+
   test "if a latch changed often during a delay, it follows the last change" do
     id = robot(:owner_late)
     estop = Names.whereis(id, :estop)

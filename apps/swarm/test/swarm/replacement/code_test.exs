@@ -1,7 +1,8 @@
 defmodule Swarm.Replacement.CodeTest do
   @moduledoc "Modules are loaded into this VM: each test has names of its own."
   use ExUnit.Case, async: true
-  alias Swarm.Replacement.{Code, Order}
+  alias Swarm.Replacement
+  alias Swarm.Replacement.Order
   alias Swarm.Versions
 
   # Object code that was never loaded, whatever its name.
@@ -44,7 +45,7 @@ defmodule Swarm.Replacement.CodeTest do
   end
 
   defp check(mission, modules, loaded \\ %{}, kept \\ %{}),
-    do: Code.check(order(mission, modules), loaded, kept)
+    do: Replacement.Code.check(order(mission, modules), loaded, kept)
 
   test "a mission that nobody has, with modules below its name, may come, and goes without a trace" do
     modules = [
@@ -55,27 +56,27 @@ defmodule Swarm.Replacement.CodeTest do
     assert {:ok, Ours.Code1, ^modules, earlier} = check(Ours.Code1, modules)
     assert Enum.sort(earlier) == [{Ours.Code1, :absent}, {Ours.Code1.Part, :absent}]
 
-    assert Code.load(modules) == :ok
+    assert Replacement.Code.load(modules) == :ok
     assert {value(Ours.Code1), value(Ours.Code1.Part)} == {1, 1}
-    assert Code.restore(earlier) == :ok
+    assert Replacement.Code.restore(earlier) == :ok
     refute :erlang.module_loaded(Ours.Code1) or :erlang.module_loaded(Ours.Code1.Part)
   end
 
   test "a newer version replaces one that came before, and that one comes back" do
     first = [{Ours.Code2, beam(Ours.Code2)}]
     {:ok, _mission, ^first, _absent} = check(Ours.Code2, first)
-    :ok = Code.load(first)
+    :ok = Replacement.Code.load(first)
     # Who has not brought it must not replace it: nobody knows what to bring back.
     second = [{Ours.Code2, beam(Ours.Code2, value: 2)}]
     assert {:error, line} = check(Ours.Code2, second)
     assert line == "Ours.Code2 is loaded from no file of a mission's application"
 
     {:ok, _mission, ^second, earlier} = check(Ours.Code2, second, Map.new(first))
-    :ok = Code.load(second)
+    :ok = Replacement.Code.load(second)
     assert value(Ours.Code2) == 2
-    :ok = Code.restore(earlier)
+    :ok = Replacement.Code.restore(earlier)
     assert value(Ours.Code2) == 1
-    :ok = Code.restore([{Ours.Code2, :absent}])
+    :ok = Replacement.Code.restore([{Ours.Code2, :absent}])
   end
 
   test "what carries the robot is never replaced, nor a library" do
@@ -132,12 +133,12 @@ defmodule Swarm.Replacement.CodeTest do
       {Ours.Code4.Part, beam(Ours.Code4.Part, on_load?: true)}
     ]
 
-    assert Code.load(modules) ==
+    assert Replacement.Code.load(modules) ==
              {:error, "Ours.Code4.Part cannot be loaded: :on_load_not_allowed"}
 
     refute :erlang.module_loaded(Ours.Code4)
 
-    :ok = Code.load([{Ours.Code4, beam(Ours.Code4)}])
+    :ok = Replacement.Code.load([{Ours.Code4, beam(Ours.Code4)}])
     test = self()
 
     held =
@@ -147,9 +148,9 @@ defmodule Swarm.Replacement.CodeTest do
       end)
 
     assert_receive :held, 10_000
-    :ok = Code.load([{Ours.Code4, beam(Ours.Code4, value: 2)}])
+    :ok = Replacement.Code.load([{Ours.Code4, beam(Ours.Code4, value: 2)}])
     third = [{Ours.Code4, beam(Ours.Code4, value: 3)}]
-    assert Code.load(third) == {:error, "old code of Ours.Code4 is still in use"}
+    assert Replacement.Code.load(third) == {:error, "old code of Ours.Code4 is still in use"}
     assert value(Ours.Code4) == 2
     send(held, :go_on)
     assert_receive {:ok, 1}, 10_000
@@ -157,7 +158,7 @@ defmodule Swarm.Replacement.CodeTest do
 
   test "the code of a mission is read from its files, with what is below it and without what is not executed" do
     assert {:ok, Swarm.StandMission, [{"Elixir.Swarm.StandMission", read}]} =
-             Code.read(Swarm.StandMission)
+             Replacement.Code.read(Swarm.StandMission)
 
     {_module, beam, _file} = :code.get_object_code(Swarm.StandMission)
     assert byte_size(read) < div(byte_size(beam), 2)
@@ -166,18 +167,18 @@ defmodule Swarm.Replacement.CodeTest do
     code = Versions.code(Ours.Code5, 1, :push)
 
     assert {:ok, Ours.Code5, [{"Elixir.Ours.Code5", _}, {"Elixir.Ours.Code5.Push", _}]} =
-             Code.read(code)
+             Replacement.Code.read(code)
 
     assert {:ok, _mission, modules, _earlier} = check(Ours.Code5, code)
     assert Keyword.keys(modules) == Keyword.keys(code)
 
     two = code ++ Versions.code(Ours.Code6, 1)
-    assert Code.read(two) == {:error, "more than one mission: Ours.Code5, Ours.Code6"}
+    assert Replacement.Code.read(two) == {:error, "more than one mission: Ours.Code5, Ours.Code6"}
 
-    assert Code.read([{Ours.Code5, "junk"}]) ==
+    assert Replacement.Code.read([{Ours.Code5, "junk"}]) ==
              {:error, "the code cannot be read: it is no object code"}
 
     for wrong <- [[], [:a], [{:a, 1}], [{Ours.Code5, "junk"} | :a], 7, nil, "text"],
-        do: assert({:error, "code cannot be " <> _} = Code.read(wrong))
+        do: assert({:error, "code cannot be " <> _} = Replacement.Code.read(wrong))
   end
 end

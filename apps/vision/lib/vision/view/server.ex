@@ -1,6 +1,6 @@
 defmodule Vision.View.Server do
   @moduledoc """
-  The process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
+  Runs the process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
   with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
   the camera or ffmpeg.
   """

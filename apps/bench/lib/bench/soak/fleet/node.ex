@@ -1,6 +1,6 @@
 defmodule Bench.Soak.Fleet.Node do
   @moduledoc """
-  What runs on a robot's node of `bin/soak`: the applications as in a release, whose end ends the node, one
+  Describes what runs on a robot's node of `bin/soak`: the applications as in a release, whose end ends the node, one
   robot in the world of `Bench.Soak.WorldHost`, and the log of its doings (`Bench.Soak.Recorder`).
   """
   alias Bench.Soak.{Recorder, WorldHost}

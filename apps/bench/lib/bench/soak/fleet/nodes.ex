@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Fleet.Nodes do
-  @moduledoc "What it means for a run of `bin/soak` that a node has come up or ended. No process."
+  @moduledoc "Describes what it means for a run of `bin/soak` that a node has come up or ended. No process."
   alias Bench.Soak.State
 
   # A robot that has used up its restarts is ended by its supervisors, and its node with it, within this time.

@@ -1,6 +1,6 @@
 defmodule Console.Live.Mesh.Frames do
   @moduledoc """
-  Which robots' poses are known to be in one frame, so that they can be drawn on one floor. Pure.
+  Decides which robots' poses are known to be in one frame, so that they can be drawn on one floor. Pure.
 
   A leader's pose is in the frame that it was in before and in the one that it defines, a follower's in its leader's, and
   all others' in that of the start poses. Files that put two robots on one place cannot both be right: what is only known

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Sensors.Bumpers do
   @moduledoc """
-  Which segments of the body are pressed, from the digital inputs. Pure.
+  Reads which segments of the body are pressed, from the digital inputs. Pure.
 
     * style `:bit` - each bit of an address is a bumper, such as the Magellan Pro's 16 at 0x40 and
       0x41

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Sensors.Layout do
   @moduledoc """
-  Which sensors a base has on which boards: from the options and, for what they leave out, from
+  Works out which sensors a base has on which boards: from the options and, for what they leave out, from
   what is usual for its body. Pure; the options are those of `Hal.RFlex.Options`.
   """
   alias Hal.{Options, Profile}

@@ -1,6 +1,6 @@
 defmodule Hal.Visca.Session.Target do
   @moduledoc """
-  Where a camera's head should look, and whether to send the command (again). Pure; the camera's
+  Decides where a camera's head should look, and whether to send the command (again). Pure; the camera's
   units.
 
   A new target is due at once. A target that was sent is due again when the head has stood still

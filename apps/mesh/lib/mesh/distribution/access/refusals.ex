@@ -8,8 +8,8 @@ defmodule Mesh.Distribution.Access.Refusals do
   a flood costs a counter for each attempt, and neither memory nor disk.
   """
   require Logger
+  alias Mesh.Distribution
   alias Hal.Event
-  alias Mesh.Distribution.Access
   alias Mesh.SafeTable
 
   @table __MODULE__
@@ -27,7 +27,7 @@ defmodule Mesh.Distribution.Access.Refusals do
   end
 
   @doc "How many were refused since the node was started, by reason; empty for a node that refuses nobody."
-  @spec counts() :: %{Access.refusal() => non_neg_integer()}
+  @spec counts() :: %{Distribution.Access.refusal() => non_neg_integer()}
   def counts do
     for why <- @reasons,
         [{^why, count}] <- [SafeTable.lookup(@table, why)],
@@ -36,7 +36,7 @@ defmodule Mesh.Distribution.Access.Refusals do
   end
 
   @doc "Notes a refusal."
-  @spec note(:inet.ip_address(), Access.refusal(), integer()) :: :ok
+  @spec note(:inet.ip_address(), Distribution.Access.refusal(), integer()) :: :ok
   def note(ip, why, now_ms) do
     _count = :ets.update_counter(@table, why, 1)
 

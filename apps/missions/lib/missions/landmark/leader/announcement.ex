@@ -1,12 +1,12 @@
 defmodule Missions.Landmark.Leader.Announcement do
   @moduledoc """
-  What a leader announces each tick (`Swarm.Formation.Reference`, the anchor): where it is
+  Decides what a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
   supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
   milliradians.
   """
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Shape}
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
 
   # A landmark that was measured at most this long ago is where it was reported.
   @still_ms 400

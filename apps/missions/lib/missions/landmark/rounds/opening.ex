@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Rounds.Opening do
-  @moduledoc "When a robot opens a round of the landmark mission, and when it leaves one. Pure."
+  @moduledoc "Decides when a robot opens a round of the landmark mission, and when it leaves one. Pure."
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, Merge, Policy}
   alias Missions.Landmark.Rounds.View

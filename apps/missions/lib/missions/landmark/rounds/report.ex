@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Rounds.Report do
-  @moduledoc "What a robot reports in a round of the landmark mission, and when. Pure."
+  @moduledoc "Decides what a robot reports in a round of the landmark mission, and when. Pure."
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Policy}
   alias Swarm.Agreement.Round
@@ -32,11 +32,9 @@ defmodule Missions.Landmark.Rounds.Report do
 
   defp put_report(mission, found?) do
     found? = found? and mission.sight != nil
-    size = if found?, do: mission.sight.size_ppm, else: 0
 
     report = %{
-      found: found?,
-      size_ppm: size,
+      merit: if(found?, do: mission.sight.size_ppm),
       pose: Landmark.State.millimetres(mission.percept.pose),
       led: if(mission.phase in [:lead, :agree], do: mission.led, else: 0),
       of: mission.of

@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Rounds.View do
-  @moduledoc "Who takes part in the landmark mission, as far as a robot hears. Pure."
+  @moduledoc "Decides who takes part in the landmark mission, as far as a robot hears. Pure."
   alias Missions.Landmark
   alias Swarm.Membership.Heartbeat
 

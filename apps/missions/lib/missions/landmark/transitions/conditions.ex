@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Transitions.Conditions do
-  @moduledoc "Which conditions of `Missions.Landmark.Transitions` hold for a robot now. Pure."
+  @moduledoc "Decides which conditions of `Missions.Landmark.Transitions` hold for a robot now. Pure."
   alias Missions.Landmark
   alias Missions.Landmark.{Leader, Policy, ReferenceInbox, Rounds, Transitions}
   alias Swarm.Agreement.Round

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Transitions.Entry do
   @moduledoc """
-  What a robot forgets and takes up when it enters a phase of `Missions.Landmark.Transitions`.
+  Decides what a robot forgets and takes up when it enters a phase of `Missions.Landmark.Transitions`.
   Pure.
   """
   alias Missions.Landmark

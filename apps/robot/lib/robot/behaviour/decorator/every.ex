@@ -6,10 +6,9 @@ defmodule Robot.Behaviour.Decorator.Every do
   Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0).
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
   alias Hal.Options
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     behaviour = {:check, &match?({_, list} when is_list(list), &1), "{module, options}"}
 
@@ -22,7 +21,7 @@ defmodule Robot.Behaviour.Decorator.Every do
     {__MODULE__, Enum.into(Options.check!(options, table, "every"), state)}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, %{running: nil} = state) do
     if state.since_ms == nil or percept.at_ms - state.since_ms >= state.period_ms do
       {module, options} = state.start
@@ -35,7 +34,7 @@ defmodule Robot.Behaviour.Decorator.Every do
   def tick(percept, state), do: go_on(percept, state)
 
   defp go_on(percept, state) do
-    case Behaviour.tick(state.running, percept) do
+    case Robot.Behaviour.tick(state.running, percept) do
       {:running, wish, running} -> {:running, wish, {__MODULE__, %{state | running: running}}}
       {:done, _outcome, wish} -> {:running, wish, {__MODULE__, %{state | running: nil}}}
     end

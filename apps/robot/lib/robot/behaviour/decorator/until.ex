@@ -7,10 +7,9 @@ defmodule Robot.Behaviour.Decorator.Until do
   the percept, and `after_ms`, a time since the first tick; `outcome`.
   """
   @behaviour Robot.Behaviour
-  alias Robot.Behaviour
   alias Hal.Options
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def new(options) do
     table = [
       inner: [{:check, &match?({_, _}, &1), "a behaviour"}, required: true],
@@ -27,11 +26,11 @@ defmodule Robot.Behaviour.Decorator.Until do
     {__MODULE__, Enum.into(options, %{since_ms: nil})}
   end
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def update(options, state),
-    do: {__MODULE__, %{state | inner: Behaviour.update(state.inner, options)}}
+    do: {__MODULE__, %{state | inner: Robot.Behaviour.update(state.inner, options)}}
 
-  @impl Behaviour
+  @impl Robot.Behaviour
   def tick(percept, state) do
     state = %{state | since_ms: state.since_ms || percept.at_ms}
 
@@ -44,7 +43,7 @@ defmodule Robot.Behaviour.Decorator.Until do
   defp late?(percept, state), do: percept.at_ms - state.since_ms >= state.after_ms
 
   defp run(percept, state) do
-    case Behaviour.tick(state.inner, percept) do
+    case Robot.Behaviour.tick(state.inner, percept) do
       {:running, wish, inner} -> {:running, wish, {__MODULE__, %{state | inner: inner}}}
       done -> done
     end

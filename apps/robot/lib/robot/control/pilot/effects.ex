@@ -10,16 +10,15 @@ defmodule Robot.Control.Pilot.Effects do
   | `{:stage, name, map}` | the event `[:robot, :stage]` |
   """
   alias Hal.Event
-  alias Robot.Config
   alias Robot.Control.Executive
   alias Robot.Trace
   alias Robot.Localiser.Anchors
   import Robot.Mission, only: [is_order: 1]
 
   @doc "Carries out one effect, and records it in the trace."
-  @spec carry_out(Robot.Mission.effect(), Config.t()) :: :ok
+  @spec carry_out(Robot.Mission.effect(), Robot.Config.t()) :: :ok
   def carry_out(effect, config) do
-    at_ms = Config.now(config)
+    at_ms = Robot.Config.now(config)
     Trace.effect(config, :pilot, effect, at_ms)
     _ = carry_out(effect, config, at_ms)
     :ok
@@ -41,8 +40,8 @@ defmodule Robot.Control.Pilot.Effects do
   end
 
   @doc "Makes the executive drop the orders of a mission that has ended."
-  @spec rest(Config.t()) :: :ok
-  def rest(%Config{id: id}) do
+  @spec rest(Robot.Config.t()) :: :ok
+  def rest(%Robot.Config{id: id}) do
     for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],
         do: Executive.obey(id, order)
 

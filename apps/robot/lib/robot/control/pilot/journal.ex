@@ -1,6 +1,6 @@
 defmodule Robot.Control.Pilot.Journal do
   @moduledoc """
-  What a pilot publishes about itself: on the board, in events and in the trace.
+  Describes what a pilot publishes about itself: on the board, in events and in the trace.
 
   The board's entry `:mission` contains the mission, its phase and its claim, the time of the
   percept from which the mission made that claim, and the options with which it was started. The entry `:asking`
@@ -8,12 +8,12 @@ defmodule Robot.Control.Pilot.Journal do
   that does not return.
   """
   alias Hal.Event
-  alias Robot.{Board, Config}
+  alias Robot.Board
   alias Robot.Trace
 
   @typedoc "The part of a pilot's data that is needed here; `since_ms` is when its state began."
   @type data :: %{
-          required(:config) => Config.t(),
+          required(:config) => Robot.Config.t(),
           required(:board) => Board.t(),
           required(:since_ms) => integer(),
           required(:runner) => Robot.Mission.Runner.t(),
@@ -25,7 +25,7 @@ defmodule Robot.Control.Pilot.Journal do
   @doc "Records an input in the trace."
   @spec heard(term(), data()) :: :ok
   def heard(input, %{config: config}) do
-    _ = Trace.input(config, :pilot, input, Config.now(config))
+    _ = Trace.input(config, :pilot, input, Robot.Config.now(config))
     :ok
   end
 
@@ -37,7 +37,12 @@ defmodule Robot.Control.Pilot.Journal do
   @doc "Offers the pilot's state to the trace."
   @spec checkpoint(state(), data()) :: :ok
   def checkpoint(state, %{config: config, runner: runner}) do
-    Trace.checkpoint(config, :pilot, fn -> {runner, %{state: state}} end, Config.now(config))
+    Trace.checkpoint(
+      config,
+      :pilot,
+      fn -> {runner, %{state: state}} end,
+      Robot.Config.now(config)
+    )
   end
 
   @doc """
@@ -49,7 +54,7 @@ defmodule Robot.Control.Pilot.Journal do
 
   def asking(module, %{board: board, config: config}, function) do
     call = {module, System.unique_integer()}
-    Board.put(board, :pilot, :asking, call, Config.now(config))
+    Board.put(board, :pilot, :asking, call, Robot.Config.now(config))
     result = function.()
     answered(board)
     result
@@ -67,7 +72,7 @@ defmodule Robot.Control.Pilot.Journal do
   def changed(state, state, claim, data), do: written(state, claim, data)
 
   def changed(_before, state, claim, data),
-    do: told(state, claim, %{data | since_ms: Config.now(data.config)})
+    do: told(state, claim, %{data | since_ms: Robot.Config.now(data.config)})
 
   @doc "Publishes a state that is new, or the first one, also as an event and in the trace."
   @spec told(state(), claim :: map(), data()) :: data()
@@ -89,7 +94,7 @@ defmodule Robot.Control.Pilot.Journal do
       options: data.options
     }
 
-    Board.put(data.board, :pilot, :mission, entry, Config.now(data.config))
+    Board.put(data.board, :pilot, :mission, entry, Robot.Config.now(data.config))
     data
   end
 end

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Silhouettes.Reference do
   @moduledoc """
-  How well a picture fits the silhouettes of robots, from places along a line: what `Robot.Localiser.Silhouettes` asks of its
+  Computes how well a picture fits the silhouettes of robots, from places along a line: what `Robot.Localiser.Silhouettes` asks of its
   kernel, in Elixir. The kernel in C gives the same, because both call the C library's functions in the same order. Pure.
   """
   alias Hal.Pose

@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Grid.Reference do
   @moduledoc """
-  What the kernels of `Robot.Navigation.Grid` compute, in Elixir: the definition, for small grids and for builds without C.
+  Defines what the kernels of `Robot.Navigation.Grid` compute, in Elixir: the definition, for small grids and for builds without C.
   The same bytes and the same ways. Pure.
   """
 

@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.MapFile.Picture do
   @moduledoc """
-  What a picture shows of walls, and the cells they fill. Pure.
+  Describes what a picture shows of walls, and the cells they fill. Pure.
 
   Pixels darker than half are wall. A picture of the three shades that map_server writes, 0 for
   wall, 205 for unknown and 254 for floor, and of no other, is read as it means them: what is

@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.OccupancyGrid.Reference do
   @moduledoc """
-  What the kernels of `Robot.Navigation.OccupancyGrid` compute, in Elixir: the definition, for small grids and for builds
+  Defines what the kernels of `Robot.Navigation.OccupancyGrid` compute, in Elixir: the definition, for small grids and for builds
   without C. The same bytes. Pure.
 
   The evidence of a cell is a whole number from -40 (free) to 60 (wall), 0 if nothing is known: log odds in steps of

@@ -4,7 +4,7 @@ defmodule Sim.Chaos.Invariants.Slots do
 
   | invariant | what must hold |
   |---|---|
-  | `bad_anchor` | what a leader announces is valid: every follower once, every slot once (`Swarm.Formation.Reference.valid?/1`) |
+  | `bad_anchor` | what a leader announces is valid: every follower once, every slot once (`Missions.Landmark.Reference.valid?/1`) |
   | `same_slot` | followers of one leader and epoch that have a fresh reference have different slots |
 
   An anchor is good for 1 s (docs/architecture.md, table of times), and a follower without a fresh one
@@ -13,7 +13,7 @@ defmodule Sim.Chaos.Invariants.Slots do
   """
   alias Missions.Landmark.State
   alias Sim.Chaos.Violation
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
 
   @fresh_ms 1_000
   # A reference is passed on along the chain, one tick a robot; relays have three at most.

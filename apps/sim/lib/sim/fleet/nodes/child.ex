@@ -3,8 +3,8 @@ defmodule Sim.Fleet.Nodes.Child do
   A node that we started: its process of the operating system behind a port (`Vm.open/2`). It lives no longer
   than we do, even frozen.
   """
+  alias Sim.Fleet.Nodes
   alias Sim.Fleet.Nodes.Command
-  alias Sim.Fleet.Nodes.Config
 
   @kept_bytes 4_000
   @end_ms 2_000
@@ -22,13 +22,13 @@ defmodule Sim.Fleet.Nodes.Child do
         }
 
   @doc "Starts a node, in the calling process; `home` holds its cookie."
-  @spec start(Config.t(), Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
-  def start(%Config{} = config, home) do
+  @spec start(Nodes.Config.t(), Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
+  def start(%Nodes.Config{} = config, home) do
     arguments = Command.arguments(Application.get_env(:swarm, :formations, []))
 
     case Vm.open(arguments, [{"HOME", home}, {"ERL_CRASH_DUMP_SECONDS", "0"}]) do
       {:ok, port, pid} ->
-        true = Port.command(port, Config.line(config))
+        true = Port.command(port, Nodes.Config.line(config))
         {:ok, %__MODULE__{node: config.node, port: port, pid: pid}}
 
       :error ->

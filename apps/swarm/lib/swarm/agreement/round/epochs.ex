@@ -1,6 +1,6 @@
 defmodule Swarm.Agreement.Round.Epochs do
   @moduledoc """
-  Which epochs a robot believes others: those that are no farther ahead of what it knows than a
+  Decides which epochs a robot believes others: those that are no farther ahead of what it knows than a
   fleet gets by itself (`Swarm.Wire.CounterGuard`). An epoch that nobody can have reached would
   leave no room for the next ones. Pure.
 

@@ -58,8 +58,8 @@ defmodule Swarm.Agreement.Round.Letter do
 
   defp report?(nil), do: true
 
-  defp report?(%{found: found, size_ppm: size, pose: pose, led: led, of: of} = report) do
-    map_size(report) == 5 and is_boolean(found) and is_integer(size) and size in 0..1_000_000 and
+  defp report?(%{merit: merit, pose: pose, led: led, of: of} = report) do
+    map_size(report) == 4 and (merit == nil or merit in 0..1_000_000) and
       Wire.pose?(pose) and is_integer(led) and led in 0..@most and is_integer(of) and
       of in 0..@most
   end

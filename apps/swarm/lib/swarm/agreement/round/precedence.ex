@@ -1,6 +1,6 @@
 defmodule Swarm.Agreement.Round.Precedence do
   @moduledoc """
-  Which of two rounds counts, by their ids `{epoch, counter, initiator}`: the higher one, unless
+  Decides which of two rounds counts, by their ids `{epoch, counter, initiator}`: the higher one, unless
   this robot's digest is out. Pure.
   """
   alias Swarm.Agreement.Round

@@ -1,6 +1,6 @@
 defmodule Swarm.Agreement.Round.Record do
   @moduledoc """
-  What a round agrees on: the report of each member of its view, and a digest by which two robots
+  Describes what a round agrees on: the report of each member of its view, and a digest by which two robots
   know that they hold the same. Pure.
   """
   alias Swarm.Agreement.Election
@@ -8,7 +8,7 @@ defmodule Swarm.Agreement.Round.Record do
 
   # The version of this layout and of the computations on a record: robots of different versions
   # must not believe that they agree.
-  @version 2
+  @version 3
 
   @enforce_keys [:id, :view, :reports, :digest]
   defstruct @enforce_keys
@@ -24,7 +24,7 @@ defmodule Swarm.Agreement.Round.Record do
   @doc """
   The reports of a whole view, with `nil` for a robot that was silent until the deadline.
 
-      iex> report = %{found: false, size_ppm: 0, pose: {0, 0, 0}, led: 0, of: 0}
+      iex> report = %{merit: nil, pose: {0, 0, 0}, led: 0, of: 0}
       iex> Swarm.Agreement.Round.Record.freeze([:mag1, :mag2], %{mag2: report}) == %{mag1: nil, mag2: report}
       true
   """
@@ -35,11 +35,11 @@ defmodule Swarm.Agreement.Round.Record do
   The digest of frozen reports, computed over a fixed layout of whole numbers and names, sorted by
   name, never over the external format of a term.
 
-      iex> report = %{found: true, size_ppm: 900, pose: {1, 2, 3}, led: 0, of: 0}
+      iex> report = %{merit: 900, pose: {1, 2, 3}, led: 0, of: 0}
       iex> a = Swarm.Agreement.Round.Record.digest({1, 1, :mag1}, %{mag1: report, mag2: nil})
       iex> a == Swarm.Agreement.Round.Record.digest({1, 1, :mag1}, %{mag2: nil, mag1: report})
       true
-      iex> a == Swarm.Agreement.Round.Record.digest({1, 1, :mag1}, %{mag1: %{report | size_ppm: 901}, mag2: nil})
+      iex> a == Swarm.Agreement.Round.Record.digest({1, 1, :mag1}, %{mag1: %{report | merit: 901}, mag2: nil})
       false
   """
   @spec digest(Letter.id(), reports()) :: binary()
@@ -51,10 +51,11 @@ defmodule Swarm.Agreement.Round.Record do
 
   defp line(name, nil), do: [name, ":-;"]
 
-  defp line(name, %{found: found, size_ppm: size, pose: {x, y, heading}} = report) do
+  defp line(name, %{merit: merit, pose: {x, y, heading}} = report) do
     numbers =
-      for n <- [size, x, y, heading, report.led, report.of], do: [",", Integer.to_string(n)]
+      for n <- [merit || 0, x, y, heading, report.led, report.of],
+          do: [",", Integer.to_string(n)]
 
-    [name, ":", if(found, do: "1", else: "0"), numbers, ";"]
+    [name, ":", if(merit, do: "1", else: "0"), numbers, ";"]
   end
 end

@@ -1,12 +1,11 @@
 defmodule Swarm.Agreement.Round.Tally do
   @moduledoc """
-  What a robot has heard in a round: the reports and the digests of its view, and whether they are
+  Counts what a robot has heard in a round: the reports and the digests of its view, and whether they are
   all there and the same. Pure.
 
   The first report and the first digest of a robot in a round are final.
   """
   alias Swarm.Agreement.{Election, Round}
-  alias Swarm.Agreement.Round.Record
 
   @doc "Takes reports, of which those count that are new and of the view."
   @spec reports(Round.t(), %{atom() => Election.report() | :busy | nil}) :: Round.t()
@@ -48,12 +47,12 @@ defmodule Swarm.Agreement.Round.Tally do
   def unsigned?(round, id), do: id in round.view and not is_map_key(round.digests, id)
 
   @doc "The record of what has been reported, as far as this robot knows."
-  @spec record(Round.t()) :: Record.t()
+  @spec record(Round.t()) :: Round.Record.t()
   def record(round),
-    do: %Record{
+    do: %Round.Record{
       id: round.id,
       view: round.view,
-      reports: Record.freeze(round.view, round.reports),
+      reports: Round.Record.freeze(round.view, round.reports),
       digest: round.digest
     }
 end

@@ -1,8 +1,8 @@
-defmodule Swarm.Formation.Reference do
+defmodule Missions.Landmark.Reference do
   @moduledoc """
-  Where the leader is supposed to be, and the shape relative to it: everything that a follower
+  Says where the leader is supposed to be, and the shape relative to it: everything that a follower
   needs to compute its slot. The leader makes a new reference each tick; it travels in the
-  leader's heartbeats and, from parent to child, along the chain (R28, R53: n - 1 messages), so
+  leader's claim and, from parent to child, along the chain (R28, R53: n - 1 messages), so
   that a follower that does not hear the leader still knows its place. The newest sequence number
   wins; the epoch excludes former leaders.
 
@@ -73,11 +73,11 @@ defmodule Swarm.Formation.Reference do
   @doc """
   Which of two anchors a follower believes: higher epoch, then newer sequence.
 
-      iex> old = %Swarm.Formation.Reference{leader: :mag1, epoch: 1, sequence: 9, pose: {0, 0, 0}, twist: {0, 0},
+      iex> old = %Missions.Landmark.Reference{leader: :mag1, epoch: 1, sequence: 9, pose: {0, 0, 0}, twist: {0, 0},
       ...>   formation: {:column, 1.0}, order: [], size: 1, places: []}
-      iex> Swarm.Formation.Reference.newest(old, %{old | epoch: 2, sequence: 0}).epoch
+      iex> Missions.Landmark.Reference.newest(old, %{old | epoch: 2, sequence: 0}).epoch
       2
-      iex> Swarm.Formation.Reference.newest(nil, old) == old
+      iex> Missions.Landmark.Reference.newest(nil, old) == old
       true
   """
   @spec newest(t() | nil, t()) :: t()
