@@ -74,7 +74,7 @@ defmodule Sim.AstrayTest do
     }
 
     {wish, avoid} =
-      case Behaviour.tick(mind.avoid, percept) do
+      case Robot.Behaviour.tick(mind.avoid, percept) do
         {:running, wish, avoid} -> {if(wish, do: wish.twist, else: Twist.zero()), avoid}
         _done -> {Twist.zero(), nil}
       end

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.MarksTest do
   alias Missions.Landmark
   alias Missions.Landmark.Marks
   alias Robot.Percept
-  alias Swarm.Formation.Reference
+  alias Missions.Landmark.Reference
   alias Swarm.Membership.Heartbeat
   doctest Marks
 

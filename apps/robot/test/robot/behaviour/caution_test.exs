@@ -91,7 +91,7 @@ defmodule Robot.Behaviour.CautionTest do
         |> Enum.with_index()
         |> Enum.map_reduce(avoid, fn {range, n}, state ->
           percept = %{percept | sonar: echo.(range), at_ms: 100 * n}
-          {:running, wish, state} = Behaviour.tick(state, percept)
+          {:running, wish, state} = Robot.Behaviour.tick(state, percept)
           {wish.twist.linear, state}
         end)
 

@@ -25,6 +25,8 @@ defmodule Swarm.Agreement.Round do
   @repeat_ms_per_robot 8
   # How long reports are echoed: before the digest if some are missing, else along with it.
   @echo_ms 200
+  # So many, the first of the view, echo them when none is missing.
+  @echoing 10
   # Counted in repeats: when to ask for a missing digest, and when to give up a round.
   @ask_after 4
   @give_up_after 25
@@ -246,7 +248,7 @@ defmodule Swarm.Agreement.Round do
         purpose: round.purpose,
         remaining_ms: round.deadline_ms - now_ms,
         report: round.report,
-        known: if(round.echo?, do: round.reports),
+        known: if(round.echo? and echoes?(round), do: round.reports),
         digest: round.digest,
         ask: round.phase == :digest and now_ms - round.since_ms >= @ask_after * repeat_ms(round)
       }
@@ -256,6 +258,11 @@ defmodule Swarm.Agreement.Round do
       {round, []}
     end
   end
+
+  # All reports in the letters of all to all would be the cube of a large group. Where reports are missing, each may have
+  # one that nobody else has.
+  defp echoes?(%{phase: :echo}), do: true
+  defp echoes?(round), do: round.me in Enum.take(round.view, @echoing)
 
   defp repeat_ms(round), do: max(@repeat_ms, @repeat_ms_per_robot * length(round.view))
 end
