@@ -7,7 +7,7 @@ defmodule Sim.AstrayTest do
   use Sim.LockstepCase, async: true
   @moduletag :slow
   alias Hal.{Pose, Twist}
-  alias Robot.{Behaviour, Percept}
+  alias Robot.Percept
   alias Robot.Behaviour.{Avoid, Goto}
   alias Robot.Safety.Reflex
   alias Sim.Trial.Setup
