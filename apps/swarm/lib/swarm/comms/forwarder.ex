@@ -12,18 +12,16 @@ defmodule Swarm.Comms.Forwarder do
   alias Swarm.Message
   alias Swarm.Membership.{Heartbeat, NameSet}
 
-  # A robot that has just joined is not in anybody's list yet, and hears nobody. In a large fleet it takes longer.
+  # A robot that has just joined is not in anybody's list yet.
   @patience_ms 300
-  @patience_ms_per_robot 10
   # Letters are repeated every 100 ms; the same letter arrives more often by several ways.
   @repeat_ms 90
   @alive_ms 1_000
   @relays 2
 
-  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}, joined: %{}
+  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}
 
   @typedoc """
-  `joined` says since when each of the robots is heard.
   `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `missing`
   says since when a robot (the second of the pair) has not heard another; `beats` and
   `letters` say what was last forwarded from which robot to which.
@@ -32,7 +30,6 @@ defmodule Swarm.Comms.Forwarder do
           missing: %{{atom(), atom()} => integer()},
           beats: %{{atom(), atom()} => {integer(), integer()}},
           letters: %{{atom(), atom()} => {non_neg_integer(), integer()}},
-          joined: %{atom() => integer()},
           heard: {[atom()], NameSet.t()}
         }
 
@@ -47,41 +44,20 @@ defmodule Swarm.Comms.Forwarder do
   @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
   def beats(relay, me, peers, now_ms) do
     {names, all} = heard = heard(relay.heard, me, peers, now_ms)
-    relay = if heard == relay.heard, do: relay, else: joined(%{relay | heard: heard}, now_ms)
-    lacking = for to <- names, not all?(peers, to, all), do: to
 
-    pairs = if lacking == [], do: [], else: pairs(relay, me, peers, lacking, now_ms)
+    pairs =
+      for to <- names,
+          %{^to => %{beat: %{heard: roll}}} = peers,
+          not NameSet.all_but?(roll, all, to),
+          NameSet.member?(roll, me),
+          from <- names -- NameSet.names(roll),
+          from != to,
+          do: {from, to}
 
     if pairs == [] and relay.missing == %{},
-      do: {relay, []},
-      else: forward(relay, me, peers, pairs, now_ms)
+      do: {%{relay | heard: heard}, []},
+      else: forward(%{relay | heard: heard}, me, peers, pairs, now_ms)
   end
-
-  # Who misses whom, as far as this robot may have to forward. Where all are new, as at the start of a fleet, or where two
-  # robots that come first hear everybody, it need not look at all pairs, of which there are the square of the fleet's size.
-  defp pairs(relay, me, peers, lacking, now_ms) do
-    {names, all} = relay.heard
-    patience_ms = patience_ms(relay)
-    old = for id <- names, now_ms - relay.joined[id] >= patience_ms, do: id
-    first = for id <- names, id < me, all?(peers, id, all), do: id
-
-    for to <- lacking,
-        now_ms - relay.joined[to] >= patience_ms,
-        %{^to => %{beat: %{heard: roll}}} = peers,
-        NameSet.member?(roll, me),
-        not Enum.any?(Stream.drop(Stream.filter(first, &NameSet.member?(roll, &1)), @relays - 1)),
-        from <- old -- NameSet.names(roll),
-        from != to,
-        do: {from, to}
-  end
-
-  defp all?(peers, id, all) do
-    %{^id => %{beat: %{heard: roll}}} = peers
-    NameSet.all_but?(roll, all, id)
-  end
-
-  defp joined(%{heard: {names, _all}, joined: joined} = relay, now_ms),
-    do: %{relay | joined: Map.new(names, &{&1, Map.get(joined, &1, now_ms)})}
 
   # Those that are heard now, and the set of these and of this robot: mostly the same as before.
   defp heard({names, _all} = before, me, peers, now_ms) do
@@ -105,7 +81,7 @@ defmodule Swarm.Comms.Forwarder do
   defp forward(relay, me, peers, pairs, now_ms) do
     {names, _all} = relay.heard
     alive = Map.take(peers, names)
-    missing = Map.new(pairs, &{&1, relay.missing[&1] || since(relay, &1, now_ms)})
+    missing = Map.new(pairs, &{&1, Map.get(relay.missing, &1, now_ms)})
 
     relay = %{
       relay
@@ -115,28 +91,12 @@ defmodule Swarm.Comms.Forwarder do
     }
 
     for {from, to} = pair <- pairs,
-        late?(relay, pair, now_ms),
+        now_ms - missing[pair] >= @patience_ms,
         mine?(me, from, to, alive, now_ms),
         reduce: {relay, []} do
       {relay, sent} -> beat(relay, me, pair, alive[from], sent)
     end
   end
-
-  # One that has just joined has been missed since then.
-  defp since(%{joined: joined} = relay, {from, to}, now_ms) do
-    joined_ms = max(joined[from], joined[to])
-    if now_ms - joined_ms < 2 * patience_ms(relay), do: joined_ms, else: now_ms
-  end
-
-  defp late?(relay, pair, now_ms) do
-    case relay.missing do
-      %{^pair => since_ms} -> now_ms - since_ms >= patience_ms(relay)
-      _not_missing -> false
-    end
-  end
-
-  defp patience_ms(%{heard: {names, _all}}),
-    do: max(@patience_ms, @patience_ms_per_robot * length(names))
 
   defp beat(relay, me, {from, to} = pair, %{beat: beat} = peer, sent) do
     number = {beat.boot, beat.sequence}
@@ -167,7 +127,7 @@ defmodule Swarm.Comms.Forwarder do
 
     for to <- letter.view,
         to not in [me, from],
-        late?(relay, {from, to}, now_ms),
+        is_map_key(relay.missing, {from, to}),
         fresh?(relay.letters[{from, to}], content, now_ms),
         mine?(me, from, to, peers, now_ms),
         {:ok, relayed} <- [Message.pass_on(message, me)],
