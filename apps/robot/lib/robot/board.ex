@@ -268,6 +268,9 @@ defmodule Robot.Board do
 
   @impl GenServer
   def init(%Robot.Config{} = config) do
+    # So that it writes what it has been told to write before it ends.
+    Process.flag(:trap_exit, true)
+
     board = %__MODULE__{
       robot: config.id,
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),

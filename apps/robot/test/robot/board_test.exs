@@ -83,6 +83,21 @@ defmodule Robot.BoardTest do
     refute Board.latched?(board(:board5, estop_file: file))
   end
 
+  test "a latch that is set while the robot ends is written", %{tmp_dir: dir} do
+    file = Path.join(dir, "estop")
+    {:ok, pid} = Board.start_link(config(:board9, estop_file: file))
+    board = Board.find!(:board9)
+
+    true = :erlang.suspend_process(pid)
+    Board.latch(board)
+    monitor = Process.monitor(pid)
+    Process.unlink(pid)
+    Process.exit(pid, :shutdown)
+    true = :erlang.resume_process(pid)
+    assert_receive {:DOWN, ^monitor, :process, ^pid, :shutdown}, 5_000
+    assert File.exists?(file)
+  end
+
   test "a file that cannot be written is told, and the latch holds", %{tmp_dir: dir} do
     tell = fn _event, _measurements, metadata, test -> send(test, metadata) end
     :ok = Hal.Event.attach(:board6, [:robot, :estop_file, :error], tell, self())
