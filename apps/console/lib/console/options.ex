@@ -29,7 +29,7 @@ defmodule Console.Options do
             page: 0,
             page_address: {127, 0, 0, 1},
             page_token: nil,
-            plan: :none,
+            plan: nil,
             headless: false,
             speed: nil,
             nodes: false,
@@ -96,7 +96,7 @@ defmodule Console.Options do
       bin/demo --headless --kill leader@40 --seed 7         what happens when the leader dies?
       bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
       bin/demo --headless --map hospital --json -           a report for another program
-      bin/demo --map hospital --landmark 0,10.9 --plan known   a landmark in another room: through the doors
+      bin/demo --map hospital --landmark 0,10.9             a landmark in another room: through the doors
       bin/demo --speed 5                                    five times as fast; pause, step, speed max
       bin/demo --nodes --robots 4                           five processes: kill -9 one of them
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
@@ -112,8 +112,9 @@ defmodule Console.Options do
   def trial(%__MODULE__{} = options) do
     options
     |> Map.take(
-      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs plan hardware)a
+      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs hardware)a
     )
+    |> Map.put(:plan, plan(options))
     |> Map.put(:duration_s, duration_s(options))
     |> Map.merge(if options.mission, do: %{mission: options.mission}, else: %{})
     |> Map.merge(if options.nodes, do: %{nodes: true}, else: %{})
@@ -126,6 +127,10 @@ defmodule Console.Options do
   """
   @spec real_time?(t()) :: boolean()
   def real_time?(%__MODULE__{nodes: nodes?, hardware: hardware}), do: nodes? or hardware != []
+
+  # Whoever makes a map does not have it.
+  defp plan(%{plan: nil, mission: mission}), do: if(maps?(mission), do: :none, else: :known)
+  defp plan(%{plan: plan}), do: plan
 
   @doc """
   How long the run may take, in simulated seconds.
@@ -148,7 +153,7 @@ defmodule Console.Options do
       {"map", "NAME", &MapName.parse(&1, folder),
        "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT (or FILE.pgm) in metres (hall)"},
       {"plan", "HOW", &Parse.choice(&1, none: :none, known: :known, sonar: :sonar),
-       "whether robots have the floor plan (known), remember walls that their\nsonars saw (sonar), or do neither: known, sonar, none (none)"},
+       "whether robots have the floor plan (known), remember walls that their\nsonars saw (sonar), or do neither: known, sonar, none\n(known; with a mission that makes the map, such as explore: none)"},
       {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),
        "spread over the map, or all switched on at one pose: same (spread)"},
       {"landmark", "X,Y|none", &landmark/1,

@@ -51,7 +51,9 @@ defmodule Console.Report do
     [
       outcome(result, formed?) <>
         no_room(result.stages, formed?) <>
-        wrong(result.claims) <> blocked(result.fleet) <> unsure(result.fleet) <> seen(result),
+        wrong(result.claims) <>
+        blocked(result.fleet) <>
+        unsure(result.fleet) <> if(formed?, do: "", else: under_way(result.fleet)) <> seen(result),
       safety(result),
       leadership(result),
       "#{Format.decimals(result.simulated_s, 1)} s simulated in #{Format.decimals(wall_s, 1)} s" <>
@@ -200,6 +202,19 @@ defmodule Console.Report do
       [one] -> " Not sure of its place: #{one}."
       several -> " Not sure of their places: #{Enum.join(several, ", ")}."
     end
+  end
+
+  # Followers that claim nothing else.
+  defp under_way(fleet) do
+    case for %{alive: true, state: :follow, name: name} <- fleet, do: name do
+      [] -> ""
+      robots -> " Still on the way: #{some(robots)}."
+    end
+  end
+
+  defp some(robots) do
+    {told, others} = Enum.split(robots, @told)
+    Enum.join(told, ", ") <> if(others == [], do: "", else: " and #{length(others)} more")
   end
 
   defp speed(times), do: Format.decimals(times, if(times < 10, do: 1, else: 0))

@@ -83,6 +83,14 @@ defmodule Console.ReportTest do
     refute hd(Report.summary(result, false, 2.0)) =~ "Blocked"
   end
 
+  test "the summary says who is still on the way" do
+    result = result("")
+    robots = Enum.map(result.fleet, &%{&1 | state: :follow, alive: &1.name != :mag1})
+    line = hd(Report.summary(%{result | fleet: robots}, false, 2.0))
+    assert line =~ "Still on the way: mag2, mag3, min1, min2 and 1 more."
+    refute hd(Report.summary(%{result | fleet: robots}, true, 2.0)) =~ "on the way"
+  end
+
   test "the report says how sure each robot is, the summary which are not sure enough to be in place" do
     result = result("")
     [first, second | rest] = result.fleet

@@ -5,8 +5,9 @@ defmodule Missions.Landmark.Shape do
   The shape is the requested one as long as that is possible. Slots that a dead robot's body
   occupies are left out. When followers report that their slots are blocked, and all others stand
   in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
-  leader's trail. Once the leader has moved on, or a person asks for a shape, the requested shape
-  is tried again.
+  leader's trail, then a cluster round it. When half of them are blocked, at least three, the cluster
+  follows at once. In a cluster, places that a follower could not get to are left out of the next one. Once the
+  leader has moved on, or a person asks for a shape, the requested shape is tried again.
 
   A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
   each time that followers cannot get in. While it drives, it keeps the requested shape where that fits, and is followed in a
@@ -22,6 +23,11 @@ defmodule Missions.Landmark.Shape do
   @step 0.1
   @elsewhere 1.0
 
+  # So many blocked followers, if they are half of all, show that the shape does not fit.
+  @many 3
+  # What stands in a place of the cluster that a follower could not get to: its radius in metres.
+  @barred 0.05
+
   # A leader that has moved this far (metres) chooses again when it stands, and one whose shape has not fitted for
   # this long while it drives.
   @moved 0.15
@@ -36,12 +42,13 @@ defmodule Missions.Landmark.Shape do
             at: nil,
             rung: :asked,
             spots: nil,
+            barred: [],
             chosen: nil,
             fit_ms: nil
 
   @typedoc """
   `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
-  slots of the formation. The choice was made for `chosen`: the request, the number of followers, how often they could not
+  slots of the formation; `barred` are places where a follower was blocked. The choice was made for `chosen`: the request, the number of followers, how often they could not
   get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
   """
   @type t :: %__MODULE__{
@@ -51,6 +58,7 @@ defmodule Missions.Landmark.Shape do
           squeeze: non_neg_integer(),
           rung: Ladder.rung() | nil,
           spots: [Pose.t()] | nil,
+          barred: [Pose.point()],
           chosen: {Formation.t(), non_neg_integer(), non_neg_integer(), Pose.point()} | nil,
           fit_ms: integer() | nil
         }
@@ -66,7 +74,7 @@ defmodule Missions.Landmark.Shape do
   def update(shape, mission, distance) do
     shape = shape |> relax(mission) |> squeeze(mission)
 
-    if mission.percept.grid,
+    if mission.percept.grid != nil or shape.squeeze >= last(mission),
       do: fit(shape, mission, distance),
       else: open(shape, mission, distance)
   end
@@ -76,7 +84,8 @@ defmodule Missions.Landmark.Shape do
     slow? = Landmark.State.slow?(mission.percept, 0.02)
     asked = {mission.formation, length(mission.order), shape.squeeze}
     here = %{pose: pose, distance: distance, trail: mission.trail}
-    space = %Space{bodies: bodies(mission), radius: radius(mission), grid: mission.percept.grid}
+    bodies = bodies(mission) ++ for({x, y} <- shape.barred, do: {x, y, @barred})
+    space = %Space{bodies: bodies, radius: radius(mission), grid: mission.percept.grid}
 
     case shape.chosen do
       {formation, followers, squeeze, at} when {formation, followers, squeeze} == asked ->
@@ -85,8 +94,12 @@ defmodule Missions.Landmark.Shape do
         shape = if fits?, do: %{shape | fit_ms: now}, else: shape
 
         cond do
+          # A cluster that was chosen without knowing the walls stays until the leader is elsewhere (`relax/2`).
+          mission.percept.grid == nil and (fits? or not slow?) ->
+            shape
+
           slow? and (moved > @moved or not fits?) ->
-            choose(shape, asked, here, space, rungs(shape), now)
+            choose(shape, asked, here, space, rungs(shape, mission), now)
 
           slow? or moved <= @moved ->
             shape
@@ -101,12 +114,23 @@ defmodule Missions.Landmark.Shape do
             choose(shape, asked, here, space, @on_the_way, now)
         end
 
+      {formation, followers, _steps, _at}
+      when shape.rung == :cluster and {formation, followers} == {elem(asked, 0), elem(asked, 1)} ->
+        refill(shape, asked, here, space, now)
+
       _none_or_for_another ->
-        choose(shape, asked, here, space, rungs(shape), now)
+        choose(shape, asked, here, space, rungs(shape, mission), now)
     end
   end
 
-  defp rungs(%{squeeze: squeeze}), do: Enum.drop(Ladder.rungs(), min(squeeze, 4))
+  defp rungs(%{squeeze: squeeze}, mission),
+    do: if(squeeze >= last(mission), do: [:cluster], else: Enum.drop(Ladder.rungs(), squeeze))
+
+  # The number of steps after which only the cluster is left.
+  defp last(%{percept: %{grid: nil}, formation: {_kind, spacing}}),
+    do: floor((spacing - Formation.least_spacing()) / @step + 1.0e-6) + 2
+
+  defp last(_knows_walls), do: length(Ladder.rungs()) - 1
 
   defp fits?(%{rung: nil}, _here, _space), do: false
 
@@ -124,6 +148,33 @@ defmodule Missions.Landmark.Shape do
       rungs == @on_the_way -> shape
       # The request stays, so that whoever is told that it cannot be knows what.
       true -> chosen(shape, none(asked, followers), whom, here, now)
+    end
+  end
+
+  # Only who could not get to its place gets another one.
+  defp refill(
+         %{spots: spots, barred: barred} = shape,
+         {asked, followers, _} = whom,
+         here,
+         space,
+         now
+       ) do
+    barred? = &(Pose.point(&1) in barred)
+    kept = for spot <- spots, not barred?.(spot), do: {spot.x, spot.y, space.radius}
+    left = followers - length(kept)
+    space = %{space | bodies: space.bodies ++ kept}
+
+    case Ladder.choose([:cluster], asked, left, here, space) do
+      nil ->
+        chosen(shape, none(asked, followers), whom, here, now)
+
+      choice ->
+        {spots, []} =
+          Enum.map_reduce(spots, choice.spots, fn spot, others ->
+            if barred?.(spot), do: {hd(others), tl(others)}, else: {spot, others}
+          end)
+
+        chosen(shape, %{choice | spots: spots, room: shape.room}, whom, here, now)
     end
   end
 
@@ -151,12 +202,17 @@ defmodule Missions.Landmark.Shape do
       shape.formation != formation or shape.room == nil or
         length(elem(shape.room, 1)) != followers
 
-    shape = %{shape | formation: formation, trail?: trail?}
+    rung = rung(trail?, formation == mission.formation)
+    shape = %{shape | formation: formation, trail?: trail?, rung: rung, spots: nil}
 
     if changed? or Landmark.State.slow?(mission.percept, 0.02),
       do: %{shape | room: room(shape, mission, followers, distance, changed?)},
       else: shape
   end
+
+  defp rung(true, _asked?), do: :column
+  defp rung(false, true), do: :asked
+  defp rung(false, false), do: :closer
 
   # A choice that still has room for all is kept, so that no robot moves for nothing.
   defp room(shape, mission, followers, distance, changed?) do
@@ -209,34 +265,63 @@ defmodule Missions.Landmark.Shape do
 
   defp relax(shape, mission) do
     if Pose.distance(mission.percept.pose, shape.at) > @elsewhere,
-      do: %{shape | squeeze: 0, squeezed_ms: mission.now_ms},
+      do: %{shape | squeeze: 0, squeezed_ms: mission.now_ms, barred: []},
       else: shape
   end
 
   defp squeeze(shape, mission) do
     due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= @step_ms
+    steps = if due? and shape.rung != nil, do: steps(shape, mission), else: 0
 
-    if due? and blocked?(mission) and
-         (not shape.trail? or shape.rung not in [nil, :cluster, :asked]),
-       do: %{
-         shape
-         | squeeze: shape.squeeze + 1,
-           squeezed_ms: mission.now_ms,
-           at: Pose.point(mission.percept.pose)
-       },
-       else: shape
+    if steps > 0,
+      do: %{
+        bar(shape, mission)
+        | squeeze: shape.squeeze + steps,
+          squeezed_ms: mission.now_ms,
+          at: Pose.point(mission.percept.pose)
+      },
+      else: shape
   end
 
   # A robot reports that it is blocked, and all others have come to rest in their places: as long
   # as some are under way, one of them may be the blocker. A robot that is not sure of its place
-  # counts as at rest, too.
-  defp blocked?(mission) do
-    beats = Landmark.State.beats(mission)
-    followers = for id <- mission.order, beat = beats[id], do: Claim.of(beat)
+  # counts as at rest, too. If many are blocked, it is not each other that they are blocked by.
+  defp steps(shape, mission) do
+    followers = followers(mission)
+    blocked = Enum.count(followers, fn {_index, claim} -> claim.blocked end)
+    rest? = fn {_index, claim} -> claim.blocked or claim.in_place or claim.unsure end
 
-    Enum.any?(followers, & &1.blocked) and
-      Enum.all?(followers, &(&1.blocked or &1.in_place or &1.unsure))
+    cond do
+      blocked >= @many and 2 * blocked >= length(followers) ->
+        max(last(mission) - shape.squeeze, 1)
+
+      blocked > 0 and Enum.all?(followers, rest?) ->
+        1
+
+      true ->
+        0
+    end
   end
+
+  # What the followers that are heard claim, each with its number in the order.
+  defp followers(mission) do
+    beats = Landmark.State.beats(mission)
+
+    for {id, index} <- Enum.with_index(mission.order),
+        beat = beats[id],
+        do: {index, Claim.of(beat)}
+  end
+
+  defp bar(%{rung: :cluster, spots: [_ | _] = spots} = shape, mission) do
+    blocked =
+      for {index, %{blocked: true}} <- followers(mission),
+          spot = Enum.at(spots, index),
+          do: Pose.point(spot)
+
+    %{shape | barred: blocked ++ shape.barred}
+  end
+
+  defp bar(shape, _mission), do: shape
 
   defp formation(asked, 0), do: {asked, false}
 

@@ -9,7 +9,7 @@ defmodule Robot.Localiser.Sightings do
   picture is compared with the result (`Robot.Localiser.Consistency`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Consistency, Matching, Silhouettes}
+  alias Robot.Localiser.{Anchors, Belief, Consistency, InSight, Matching, Silhouettes}
   alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
   alias Robot.Percept.Sighting
@@ -37,11 +37,11 @@ defmodule Robot.Localiser.Sightings do
     {landmarks, robots} = Enum.split_with(marks, &(&1.kind == :landmark))
     picture = {percept, back}
 
-    belief
-    |> see_landmarks(landmarks, picture)
-    |> Silhouettes.align(robots, percept, back)
-    |> see_robots(robots, picture)
-    |> weigh(robots, picture)
+    belief =
+      belief |> see_landmarks(landmarks, picture) |> Silhouettes.align(robots, percept, back)
+
+    robots = InSight.marks(robots, percept.grid, belief, exposed(belief, back))
+    belief |> see_robots(robots, picture) |> weigh(robots, picture)
   end
 
   defp weigh(belief, robots, {percept, back}),

@@ -8,10 +8,10 @@ defmodule Robot.Localiser.Silhouettes do
   border, in which none can be identified (`Robot.Localiser.Matching`). So places along the
   direction of greatest uncertainty are tried: for each, the columns of the picture that robots
   would fill are computed, and the wrong ones are counted. A place is accepted if few columns are
-  wrong and no place elsewhere is nearly as good.
+  wrong and no place elsewhere is nearly as good. By a floor plan, a robot that walls hide fills no columns.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
+  alias Robot.Localiser.{Anchors, Belief, Columns, Glance, InSight}
   alias Robot.Localiser.Silhouettes.{Native, Reference}
   alias Robot.Percept
   alias Robot.Percept.Sighting
@@ -23,6 +23,8 @@ defmodule Robot.Localiser.Silhouettes do
   @reach 2.5
   @step 0.05
   @steps 40
+  # So many parts of the search to each side see the same robots past the walls of a plan.
+  @parts 4
   # A wrong column adds this much to the cost, in squares of standard deviations. A place is a
   # rival of the best one if its cost is not greater by `@worse` and it is farther away than
   # `@same` metres. `@most` columns may be wrong, plus this share of those that are seen.
@@ -64,21 +66,19 @@ defmodule Robot.Localiser.Silhouettes do
     swing = abs(turn) * @reach * worst
     shift = @reach * worst + swing * Pose.distance(back, {0.0, 0.0})
 
-    bodies =
-      for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- robots,
-          in_sight?({x, y, radius, sd}, glance, shift, swing),
-          into: <<>>,
-          do: floats([x, y, radius, sd])
+    near =
+      Enum.filter(robots, fn %{at: {x, y}, radius: radius, sd: {sd, _, _}} ->
+        in_sight?({x, y, radius, sd}, glance, shift, swing)
+      end)
 
-    ways = for k <- -count..count, do: k * @reach * worst / count
     search = search(belief.pose, back, axis, turn, camera)
 
     tried =
-      Enum.zip_with(ways, kernel(bodies).fits(search, seen, bodies, floats(ways)), fn way,
-                                                                                      {wrong,
-                                                                                       clear} ->
-        {way * way / (worst * worst) + @wrong * wrong, way, wrong, clear}
-      end)
+      for ways <- ways(@reach * worst, count, percept.grid),
+          bodies = bodies(near, percept.grid, exposed, axis, ways),
+          fits = kernel(bodies).fits(search, seen, bodies, floats(ways)),
+          {way, {wrong, clear}} <- Enum.zip(ways, fits),
+          do: {way * way / (worst * worst) + @wrong * wrong, way, wrong, clear}
 
     {least, at, wrong, clear} = Enum.min(tried)
 
@@ -92,6 +92,21 @@ defmodule Robot.Localiser.Silhouettes do
       {sd, common} = found(robots, pose, axis)
       Belief.shifted(belief, axis, at, sd, common)
     end
+  end
+
+  # The places to try; with a plan in parts, from each of which the same robots count as in sight.
+  defp ways(reach, count, grid) do
+    ways = for k <- -count..count, do: k * reach / count
+    if grid, do: Enum.chunk_by(ways, &round(&1 / reach * @parts)), else: [ways]
+  end
+
+  defp bodies(robots, grid, exposed, {x, y}, ways) do
+    way = Enum.at(ways, div(length(ways), 2))
+    place = {exposed.x + way * x, exposed.y + way * y}
+
+    for %{at: {x, y}, radius: radius, sd: {sd, _, _}} <- InSight.from(robots, grid, place),
+        into: <<>>,
+        do: floats([x, y, radius, sd])
   end
 
   # Whether a robot may fill a column from any of the places, which are `shift` metres and `swing` radians away at most.

@@ -140,6 +140,24 @@ defmodule Robot.Localiser.SilhouettesTest do
     end
   end
 
+  test "robots behind the walls of a plan are not missed" do
+    # A wall from -4 to 4 at 2 m ahead, of one cell.
+    cells = for _j <- 1..80, i <- 1..80, into: <<>>, do: if(i == 61, do: <<1>>, else: <<0>>)
+    plan = Robot.Navigation.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
+
+    [first | _] = @column
+    near = %{first | at: {1.5, 0.0}}
+    hidden = for {y, key} <- [{1.2, 2}, {-1.2, 3}, {0.5, 4}], do: %{near | at: {3.0, y}, key: key}
+
+    for angle <- [-0.12, 0.05, 0.12] do
+      truth = turned(angle)
+      picture = picture([near], truth)
+      look = &Silhouettes.align(unsure(0.1), [near | hidden], %{picture | grid: &1}, @here).pose
+      assert Pose.distance(look.(plan), truth) < 0.12
+      assert look.(nil) == @here
+    end
+  end
+
   test "one that is sure enough, sees nobody, or is told of nobody stays where it is" do
     picture = picture(@column, turned(0.1))
     sure = unsure(0.045)

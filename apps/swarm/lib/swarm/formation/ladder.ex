@@ -11,7 +11,7 @@ defmodule Swarm.Formation.Ladder do
   | `:cluster` | the nearest free places round the leader, behind one another where they must be |
 
   Each robot of a shape can drive straight from its place to the leader's, or to that of a robot before it, so that no shape
-  extends behind a wall; and none stands between the leader and what it faces.
+  extends behind a wall; and none stands between the leader and what it faces, or nearer to that than the leader.
   """
   alias Hal.Pose
   alias Swarm.Formation
@@ -27,7 +27,7 @@ defmodule Swarm.Formation.Ladder do
   @stride 0.5
   @strides 60
   # The gap between robots of a cluster, from edge to edge, and how many places round the leader are tried.
-  @apart 0.4
+  @apart 0.6
   @most 400
 
   @type rung :: :asked | :turned | :closer | :column | :cluster
@@ -162,9 +162,10 @@ defmodule Swarm.Formation.Ladder do
     linked?
   end
 
-  defp hides?(place, %{pose: pose, distance: distance}),
-    do:
-      abs(Pose.bearing(pose, place)) < @ahead and Pose.distance(pose, place) < distance + @beyond
+  defp hides?(place, %{pose: pose, distance: distance}) do
+    (abs(Pose.bearing(pose, place)) < @ahead and Pose.distance(pose, place) < distance + @beyond) or
+      Pose.distance(Pose.place(pose, {distance, 0.0}), place) < distance
+  end
 
   # Places of a triangular lattice round the leader, in the order of the length of way to them: from each that is free
   # to those beside it. Places that are not free are passed, where a robot can drive through.

@@ -36,7 +36,7 @@ defmodule Missions.Landmark.Leader.Slots do
   # If the shape has changed, `:cost` assigns its slots again.
   defp shape(%{leadership: leadership} = mission) do
     shape = Shape.update(leadership.shape, mission, landmark_distance(mission))
-    new? = told(shape) != told(leadership.shape)
+    new? = told(shape) != told(leadership.shape) and not most?(shape, leadership.shape)
     mission = %{mission | leadership: %{leadership | shape: shape}}
 
     dealt? =
@@ -46,6 +46,12 @@ defmodule Missions.Landmark.Leader.Slots do
   end
 
   defp told(shape), do: {shape.formation, shape.room, shape.spots}
+
+  # If most places are where they were, whoever has lost one takes its new one, and nobody else moves.
+  defp most?(%{spots: [_ | _] = new}, %{spots: [_ | _] = old}) when length(new) == length(old),
+    do: 2 * Enum.count(Enum.zip(new, old), fn {a, b} -> a == b end) >= length(new)
+
+  defp most?(_shape, _old), do: false
 
   # Then the round's record has assigned them; it does not know where there is no room.
   defp all_free?(%{order: order, leadership: %{shape: %{room: {size, places}}}}) do

@@ -1,0 +1,96 @@
+defmodule Missions.Landmark.ShapeTest do
+  @moduledoc "What a leader that knows no walls makes of followers that are blocked."
+  use ExUnit.Case, async: true
+  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Percept
+  alias Missions.Landmark
+  alias Missions.Landmark.{Beat, Shape}
+
+  @asked {:column, 1.0}
+  @ids [:mag2, :mag3, :mag4, :mag5]
+
+  # A leader at 0,0 whose followers claim so, `now_ms` after its election.
+  defp mission(claims, now_ms, pose \\ Pose.new(0, 0)) do
+    peers =
+      for {id, claim} <- claims, into: %{} do
+        {id,
+         %{
+           pose: Pose.new(5.0, 5.0),
+           twist: Twist.zero(),
+           radius: 0.2,
+           at_ms: now_ms,
+           mode: :holding,
+           beat: Beat.new(claim)
+         }}
+      end
+
+    odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
+
+    %Landmark.State{
+      me: :mag1,
+      formation: @asked,
+      assign: :cost,
+      leader_change?: true,
+      order: Keyword.keys(claims),
+      now_ms: now_ms,
+      percept: %Percept{
+        robot: :mag1,
+        at_ms: now_ms,
+        profile: Profile.magellan(),
+        peers: peers,
+        pose: pose,
+        odometry: odometry
+      }
+    }
+  end
+
+  defp claims(blocked),
+    do: for(id <- @ids, do: {id, if(id in blocked, do: [blocked: true], else: [])})
+
+  # Every 4 s another set of followers claims to be blocked, and all others are under way, or in place.
+  defp run(steps) do
+    for {claims, n} <- Enum.with_index(steps, 1), reduce: Shape.new() do
+      shape -> Shape.update(shape, mission(claims, n * 4_000), 1.6)
+    end
+  end
+
+  test "one that is blocked while others are under way waits; half of them, and it is a cluster" do
+    assert %{rung: :asked, squeeze: 0} = run([claims([:mag2])])
+    assert %{rung: :asked, squeeze: 0} = run([claims([:mag2, :mag3])])
+    assert %{rung: :cluster, formation: @asked} = shape = run([claims([:mag2, :mag3, :mag4])])
+    assert [_, _, _, _] = places = Shape.trail(shape, mission(claims([]), 5_000))
+    # None is nearer to the landmark, at 1.6,0, than the leader is.
+    for {x, y, _heading} <- places, do: assert(Pose.distance({x, y}, {1_600, 0}) > 1_600)
+  end
+
+  test "whoever does not get to its place of a cluster is given another one, and nobody else moves" do
+    before = run([claims(@ids)])
+    later = run([claims(@ids), claims([:mag3]) |> rest()])
+    assert later.rung == :cluster
+    [a, b, c, d] = before.spots
+    assert [^a, other, ^c, ^d] = later.spots
+    for spot <- [a, b, c, d], do: assert(Pose.distance(other, spot) > 0.5)
+
+    # It learns of each.
+    again = run([claims(@ids), claims([:mag3]) |> rest(), claims([:mag3]) |> rest()])
+    assert [^a, another, ^c, ^d] = again.spots
+    assert another not in [b, other]
+    assert length(again.barred) == 2
+  end
+
+  test "after the last spacing comes the column along its way, then the cluster" do
+    one = claims([:mag2]) |> rest()
+    rungs = for n <- 1..5, do: run(List.duplicate(one, n)).rung
+    assert rungs == [:closer, :closer, :column, :cluster, :cluster]
+  end
+
+  test "a leader that has moved on asks for the shape again, and forgets where nobody got to" do
+    shape = run([claims(@ids), claims([:mag3]) |> rest()])
+    moved = Shape.update(shape, mission(claims([]), 9_000, Pose.new(0.0, 1.2)), 1.6)
+    assert %{rung: :asked, squeeze: 0, barred: [], spots: nil} = moved
+    assert Shape.trail(moved, mission(claims([]), 9_000)) == nil
+  end
+
+  defp rest(claims),
+    do: for({id, claim} <- claims, do: {id, if(claim == [], do: [in_place: true], else: claim)})
+end

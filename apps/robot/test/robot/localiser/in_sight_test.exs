@@ -1,0 +1,42 @@
+defmodule Robot.Localiser.InSightTest do
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Robot.Localiser.{Belief, Frame, InSight}
+  alias Robot.Navigation.Grid
+
+  # A wall along x = 2 with a door of 1 m about y = 0.
+  defp plan do
+    cells =
+      for j <- 0..79, i <- 0..79, into: <<>> do
+        if i == 60 and abs(j - 39.5) > 5, do: <<1>>, else: <<0>>
+      end
+
+    Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
+  end
+
+  defp mark(key, at), do: %{key: key, at: at, radius: 0.2}
+  defp keys(marks), do: Enum.map(marks, & &1.key)
+
+  @marks [ahead: {3.0, 0.0}, beside: {3.0, 1.3}, here: {1.0, 2.0}, edge: {3.0, 0.9}]
+
+  test "a wall hides what is behind it, a door does not, nor what stands out beside it" do
+    marks = for {key, at} <- @marks, do: mark(key, at)
+    sure = Belief.new(Pose.new(0, 0))
+    assert keys(InSight.marks(marks, plan(), sure, sure.pose)) == [:ahead, :here, :edge]
+    assert keys(InSight.from(marks, plan(), {0.0, 0.0})) == [:ahead, :here, :edge]
+    assert InSight.marks(marks, nil, sure, sure.pose) == marks
+    assert InSight.from(marks, nil, {0.0, 0.0}) == marks
+  end
+
+  test "whoever may stand elsewhere may see others" do
+    marks = for {key, at} <- @marks, do: mark(key, at)
+    # 1.2 m to either side, by one standard deviation.
+    unsure = Frame.reframe(Belief.new(Pose.new(0, 0)), {4.0, 0.0}, 0.0, 0.09)
+    assert :beside in keys(InSight.marks(marks, plan(), unsure, unsure.pose))
+  end
+
+  test "a robot at the same place, or in a wall, is an answer too" do
+    for at <- [{0.0, 0.0}, {2.05, 3.0}, {9.0, 9.0}],
+        do: assert(is_list(InSight.from([mark(:one, at)], plan(), {0.0, 0.0})))
+  end
+end
