@@ -18,7 +18,7 @@ defmodule Console.Cli.MapName do
           {:ok, String.t()} | {:error, String.t() | {String.t(), hint :: String.t()}}
   def parse(text, folder) do
     cond do
-      text in Maps.names() -> {:ok, text}
+      Maps.built_in?(text) -> {:ok, text}
       text =~ ~r/.\.ya?ml\z/i -> {:ok, from(text, folder)}
       true -> picture(text, folder)
     end

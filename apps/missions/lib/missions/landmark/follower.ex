@@ -35,16 +35,17 @@ defmodule Missions.Landmark.Follower do
   # belongs to. To have come nearer, it must have gained more than it may be mistaken by, or a metre.
   @late_ms 15_000
   @most_gain 1.0
-  # A slot that has moved farther than this is another one. Whoever judges from outside takes a metre, and this robot sees
-  # its slot move by what its pose is corrected by, too.
+  # A slot that has moved farther than this is another one. Whoever judges from outside takes a metre, from any place where
+  # the slot was, and this robot sees it move by what its pose is corrected by, too.
   @elsewhere 1.2
+  @here 0.1
 
   defstruct in_place?: false,
             unsure?: false,
             holding?: false,
             blocked?: false,
             blocker: nil,
-            late: nil,
+            late: [],
             told: {0, 0},
             landmark: nil,
             slot: nil,
@@ -56,7 +57,7 @@ defmodule Missions.Landmark.Follower do
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
   where the landmark stood when this robot was last in place. `best` is the least distance to
   `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
-  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: where it was, and how the robot has come nearer.
+  `obstacle_ms`. `late` is the same, ignoring small moves of the slot: from each place where it was, how the robot has come nearer since.
   `blocker` is what blocks a blocked robot.
   """
   @type t :: %__MODULE__{
@@ -65,7 +66,7 @@ defmodule Missions.Landmark.Follower do
           holding?: boolean(),
           blocked?: boolean(),
           blocker: Blocker.t() | nil,
-          late: {Pose.t(), Patience.t()} | nil,
+          late: [{Pose.t(), Patience.t()}],
           told: {non_neg_integer(), non_neg_integer()},
           landmark: {integer(), integer()} | nil,
           slot: Pose.t() | nil,
@@ -171,11 +172,13 @@ defmodule Missions.Landmark.Follower do
   # Farther away, or if the slot trembles, only time shows that a robot makes no progress.
   defp late(%{in_place?: in_place?, unsure?: unsure?} = follower, _mission, _slot, _error)
        when in_place? or unsure?,
-       do: %{follower | late: nil, blocker: nil}
+       do: %{follower | late: [], blocker: nil}
 
   defp late(follower, %{now_ms: now} = mission, slot, error) do
-    {_place, patience} = late = patience(follower.late, slot, error, now)
-    blocked? = follower.blocked? or Patience.stale?(patience, gain(mission.percept), @late_ms)
+    late = patience(follower.late, slot, error, now)
+    gain = gain(mission.percept)
+    stale? = fn {_place, patience} -> Patience.stale?(patience, gain, @late_ms) end
+    blocked? = follower.blocked? or Enum.any?(late, stale?)
 
     %{
       follower
@@ -185,13 +188,16 @@ defmodule Missions.Landmark.Follower do
     }
   end
 
-  defp patience({place, patience}, slot, error, now) do
-    if Pose.distance(place, slot) > @elsewhere,
-      do: patience(nil, slot, error, now),
-      else: {place, Patience.note(patience, error, now, :straight)}
-  end
+  defp patience(late, slot, error, now) do
+    late =
+      for {place, patience} <- late,
+          Pose.distance(place, slot) <= @elsewhere,
+          do: {place, Patience.note(patience, error, now, :straight)}
 
-  defp patience(nil, slot, error, now), do: {slot, Patience.note(nil, error, now, :straight)}
+    if Enum.any?(late, fn {place, _} -> Pose.distance(place, slot) <= @here end),
+      do: late,
+      else: [{slot, Patience.note(nil, error, now, :straight)} | late]
+  end
 
   # While its pose is corrected, a robot seems to come nearer that stands still.
   defp gain(%{uncertainty: %{radius: radius}}), do: radius |> max(@progress) |> min(@most_gain)

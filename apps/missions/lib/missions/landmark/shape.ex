@@ -19,7 +19,9 @@ defmodule Missions.Landmark.Shape do
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack}
 
+  # How long followers have to take what they were given, places of a cluster longer.
   @step_ms 3_000
+  @cluster_ms 8_000
   @step 0.1
   @elsewhere 1.0
 
@@ -270,7 +272,8 @@ defmodule Missions.Landmark.Shape do
   end
 
   defp squeeze(shape, mission) do
-    due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= @step_ms
+    time_ms = if shape.rung == :cluster, do: @cluster_ms, else: @step_ms
+    due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= time_ms
     steps = if due? and shape.rung != nil, do: steps(shape, mission), else: 0
 
     if steps > 0,

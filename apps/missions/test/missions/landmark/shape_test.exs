@@ -50,7 +50,7 @@ defmodule Missions.Landmark.ShapeTest do
   # Every 4 s another set of followers claims to be blocked, and all others are under way, or in place.
   defp run(steps) do
     for {claims, n} <- Enum.with_index(steps, 1), reduce: Shape.new() do
-      shape -> Shape.update(shape, mission(claims, n * 4_000), 1.6)
+      shape -> Shape.update(shape, mission(claims, n * 9_000), 1.6)
     end
   end
 
@@ -86,7 +86,7 @@ defmodule Missions.Landmark.ShapeTest do
 
   test "a leader that has moved on asks for the shape again, and forgets where nobody got to" do
     shape = run([claims(@ids), claims([:mag3]) |> rest()])
-    moved = Shape.update(shape, mission(claims([]), 9_000, Pose.new(0.0, 1.2)), 1.6)
+    moved = Shape.update(shape, mission(claims([]), 19_000, Pose.new(0.0, 1.2)), 1.6)
     assert %{rung: :asked, squeeze: 0, barred: [], spots: nil} = moved
     assert Shape.trail(moved, mission(claims([]), 9_000)) == nil
   end

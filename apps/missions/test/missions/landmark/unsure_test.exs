@@ -64,7 +64,7 @@ defmodule Missions.Landmark.UnsureTest do
 
   test "it reports unsure, and neither in place nor blocked" do
     assert %{unsure?: true, in_place?: false} = stand(0.1, 0.62, 1)
-    assert %{unsure?: true, blocked?: false, blocker: nil, late: nil} = stand(0.1, 0.62, 30)
+    assert %{unsure?: true, blocked?: false, blocker: nil, late: []} = stand(0.1, 0.62, 30)
     assert %{unsure?: false, in_place?: true} = stand(0.1, 0.3, 1)
   end
 

@@ -1,7 +1,7 @@
 defmodule Sim.Floorplan.Maps do
   @moduledoc "The built-in maps by name. Pure."
   alias Hal.Options.Suggest
-  alias Sim.Floorplan.Maps.{Corridors, Halls, Rough, Wide}
+  alias Sim.Floorplan.Maps.{Corridors, Halls, Partitions, Rough, Wide}
 
   @picture "FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT"
 
@@ -15,8 +15,11 @@ defmodule Sim.Floorplan.Maps do
     {"lab", Rough, "a room with diagonal walls and benches"},
     {"cave", Rough, "six chambers without a straight wall"},
     {"ring", Wide, "a round corridor; the centre is wall"},
-    {"doorway", Corridors, "two rooms and a door of 0.9 m"}
+    {"doorway", Corridors, "two rooms and a door of 0.9 m"},
+    {"rooms", Partitions, "rooms and doors at random; rooms:7 is another building"}
   ]
+
+  @seeds 0..4_294_967_295
 
   @doc """
   Their names, and what each shows in a few words.
@@ -32,14 +35,22 @@ defmodule Sim.Floorplan.Maps do
   Their names.
 
       iex> Enum.join(Sim.Floorplan.Maps.names(), " ")
-      "hall hospital arena clinic offices openplan lab cave ring doorway"
+      "hall hospital arena clinic offices openplan lab cave ring doorway rooms"
   """
   @spec names() :: [String.t()]
   def names, do: for({name, _module, _about} <- @maps, do: name)
 
-  @doc "Whether one of them has this name."
+  @doc """
+  Whether one of them has this name.
+
+      iex> for name <- ["hall", "rooms", "rooms:7", "rooms:-1", "hall:7"], do: Sim.Floorplan.Maps.built_in?(name)
+      [true, true, true, false, false]
+  """
   @spec built_in?(String.t()) :: boolean()
+  def built_in?("rooms:" <> seed), do: seed?(seed)
   def built_in?(name), do: List.keymember?(@maps, name, 0)
+
+  defp seed?(text), do: match?({seed, ""} when seed in @seeds, Integer.parse(text))
 
   @doc "What a map may be, in words."
   @spec allowed() :: String.t()
@@ -62,9 +73,11 @@ defmodule Sim.Floorplan.Maps do
   @spec fault(String.t()) :: {allowed :: String.t(), hint :: String.t()}
   def fault(name) do
     {file, size} = parts(name)
+    first..last = @seeds
     kind = file |> Path.extname() |> String.downcase()
 
     cond do
+      file == "rooms" -> {"rooms:SEED, a whole number from #{first} to #{last},", ""}
       kind in [".png", ".pgm"] and size == nil -> {sized(file), "; its size is missing"}
       kind in [".png", ".pgm"] -> {sized(file), "; #{size} is not a size"}
       kind in [".yaml", ".yml"] -> {"FILE.yaml", "; its description says how large the map is"}
@@ -84,6 +97,9 @@ defmodule Sim.Floorplan.Maps do
 
   @doc "The fields of the map of this name for a fleet of this size; `nil` if there is none."
   @spec draw(String.t(), pos_integer()) :: map() | nil
+  def draw("rooms:" <> seed = name, fleet),
+    do: if(seed?(seed), do: Partitions.draw(name, fleet))
+
   def draw(name, fleet) do
     with {^name, module, _about} <- List.keyfind(@maps, name, 0), do: module.draw(name, fleet)
   end
