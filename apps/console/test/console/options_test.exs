@@ -98,7 +98,7 @@ defmodule Console.OptionsTest do
     assert error("--map moon") =~ "hall, hospital, arena, clinic, "
 
     assert error("--map moon") =~
-             "doorway, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed"
+             "doorway, rooms, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed"
 
     assert error("--map ofices") =~ "did you mean offices"
     assert error("--map hospitel") =~ "did you mean hospital"

@@ -17,6 +17,7 @@ defmodule Sim.Floorplan.Image do
   @spec open(String.t()) :: {:ok, map()} | {:error, String.t()}
   def open(name) do
     cond do
+      String.starts_with?(name, "rooms:") -> unknown(name)
       name =~ ~r/\.ya?ml\z/i -> described(name)
       match = Regex.run(~r/\A(.+):([^:]*)\z/s, name) -> sized(name, match)
       true -> unknown(name)

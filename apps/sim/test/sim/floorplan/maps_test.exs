@@ -14,7 +14,8 @@ defmodule Sim.Floorplan.MapsTest do
     "lab" => "ea059efb",
     "cave" => "20f9d02d",
     "ring" => "1158841d",
-    "doorway" => "2fdeb273"
+    "doorway" => "2fdeb273",
+    "rooms" => "dee4d0a5"
   }
 
   defp fleet(count),
@@ -38,7 +39,7 @@ defmodule Sim.Floorplan.MapsTest do
       for seed <- 1..3 do
         assert {:ok, landmark, poses} = Floorplan.places(map, fleet(count), seed, :default)
         assert length(poses) == count
-        if name != "ring", do: assert(landmark == {0.0, 0.0})
+        if name not in ["ring", "rooms"], do: assert(landmark == {0.0, 0.0})
       end
     end
   end
@@ -55,6 +56,26 @@ defmodule Sim.Floorplan.MapsTest do
                "#{name}: #{inspect(Cells.point(map, first))}, #{room.area.cells} cells"
       end
     end
+  end
+
+  test "each seed is a building of its own, whose rooms are all reached from each other" do
+    maps = for seed <- 1..12, {:ok, map} = Floorplan.open("rooms:#{seed}", 5), do: map
+    assert maps |> Enum.uniq_by(& &1.field) |> length() == 12
+    assert {:ok, %{field: first}} = Floorplan.open("rooms", 5)
+    assert hd(maps).field == first
+
+    for map <- maps do
+      [{_map, one} | _] =
+        rooms =
+        for room <- Rooms.of(map, Rooms.steps(map, 0.7)), do: {map, Rooms.first(map, room)}
+
+      [ways] = map |> Rooms.of(Rooms.steps(map, 0.4)) |> Enum.filter(&Rooms.in?(map, &1, one))
+      assert length(rooms) > 3
+      for {map, cell} <- rooms, do: assert(Rooms.in?(map, ways, cell), map.name)
+    end
+
+    for name <- ["rooms:", "rooms:-1", "rooms:x", "rooms:4294967296"],
+        do: assert({:error, "unknown map rooms:" <> _} = Floorplan.open(name, 5))
   end
 
   test "the narrow door is 0.9 m wide, and diagonal walls are whole" do

@@ -13,7 +13,7 @@ defmodule Sim.Floorplan.Maps.Partitions do
   @least 3.0
   @doors {1.1, 1.5}
   @corner 0.4
-  @before 0.6
+  @before 1.0
   # How often a part is divided.
   @depth 4
 
