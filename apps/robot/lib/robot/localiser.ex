@@ -13,7 +13,7 @@ defmodule Robot.Localiser do
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Departure
-  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck}
+  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck, Walls}
   alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
 
@@ -35,7 +35,8 @@ defmodule Robot.Localiser do
                 anchors: %Anchors{},
                 frame: nil,
                 frame_no: nil,
-                turn_check: nil
+                turn_check: nil,
+                walls: %Walls{}
               ]
 
   # Frame numbers are sent to other robots, which accept none above half a billion.
@@ -58,7 +59,8 @@ defmodule Robot.Localiser do
           anchors: Anchors.t(),
           frame: Anchors.frame() | nil,
           frame_no: non_neg_integer() | nil,
-          turn_check: TurnCheck.t()
+          turn_check: TurnCheck.t(),
+          walls: Walls.t()
         }
 
   @doc """
@@ -145,6 +147,7 @@ defmodule Robot.Localiser do
       |> move(odometry.pose)
       |> remember(percept.at_ms)
       |> see(percept)
+      |> hear(percept)
       |> found()
 
     percept = exposed(percept, localiser)
@@ -245,6 +248,14 @@ defmodule Robot.Localiser do
         %{localiser | seen_ms: at_ms, belief: belief}
     end
   end
+
+  # A plan is in the frame of the start poses.
+  defp hear(%{frame: nil} = localiser, percept) do
+    {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
+    %{localiser | walls: walls, belief: belief}
+  end
+
+  defp hear(localiser, _percept), do: localiser
 
   # A robot that was never led: nobody knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do

@@ -234,12 +234,16 @@ defmodule Robot.Control.Controller do
     do: {percept, %{controller | percept: percept}}
 
   defp locate(controller, percept) do
-    {percept, localiser} = Localiser.update(controller.localiser, percept)
+    {percept, localiser} = Localiser.update(controller.localiser, given(percept, controller.plan))
     plan = sense(controller.plan, percept, controller.discs)
     controller = %{controller | localiser: localiser, plan: plan}
     percept = %{percept | grid: walls(controller)}
     {percept, %{controller | percept: percept}}
   end
+
+  # What its sonars have seen follows from its pose, and cannot correct it.
+  defp given(percept, %Grid{} = plan), do: %{percept | grid: plan}
+  defp given(percept, _sonar_or_none), do: %{percept | grid: nil}
 
   defp sense(%OccupancyGrid{} = sensed, percept, discs),
     do: OccupancyGrid.update(sensed, percept, discs)
