@@ -19,6 +19,9 @@ defmodule Robot.Localiser.Walls.Facing do
   @shy 0.035
   # The slope of the clearance before a straight wall is 1; it is less before a corner or between two walls.
   @straight 0.8
+  # It is as flat as this (metres) so far to both sides.
+  @side 0.3
+  @flat 0.06
   # The wall by its clearances must be where the ray ended (metres).
   @same 0.15
 
@@ -58,10 +61,17 @@ defmodule Robot.Localiser.Walls.Facing do
 
     if steep > @straight do
       {nx, ny} = {gx / steep, gy / steep}
-      distance = between(grid, at) + @shy + nx * (sonar.x - x) + ny * (sonar.y - y)
+      clear = between(grid, at)
+      distance = clear + @shy + nx * (sonar.x - x) + ny * (sonar.y - y)
       aside = abs(Pose.wrap(:math.atan2(-ny, -nx) - sonar.heading))
 
-      if aside <= cone / 2 and abs(distance - t) < @same, do: {distance, {nx, ny}}
+      flat? =
+        Enum.all?([-@side, @side], fn side ->
+          abs(between(grid, {x - side * ny, y + side * nx}) - clear) < @flat
+        end)
+
+      if aside <= cone / 2 and abs(distance - t) < @same and flat?,
+        do: {distance, {nx, ny}}
     end
   end
 
