@@ -10,7 +10,7 @@ defmodule Robot.Localiser.Walls do
 
   # Echoes of walls between these (metres) count.
   @near 0.2
-  @far 3.0
+  @far 4.5
   # Readings are taken after so much way or turn (metres, radians).
   @moved 0.15
   @turned 0.2
