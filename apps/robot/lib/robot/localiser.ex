@@ -205,6 +205,7 @@ defmodule Robot.Localiser do
         odometry: nil,
         history: History.new(),
         turn_check: nil,
+        walls: %Walls{},
         belief: Belief.doubt(localiser.belief)
     }
 
@@ -255,7 +256,7 @@ defmodule Robot.Localiser do
     %{localiser | walls: walls, belief: belief}
   end
 
-  defp hear(localiser, _percept), do: localiser
+  defp hear(localiser, _percept), do: %{localiser | walls: %Walls{}}
 
   # A robot that was never led: nobody knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do
