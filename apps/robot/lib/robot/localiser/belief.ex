@@ -254,14 +254,9 @@ defmodule Robot.Localiser.Belief do
   end
 
   @doc """
-  Whether a measurement of this variance is within the gate: the innovation `error` (measured minus expected value), and the
-  derivatives of the expected value by x, y and heading.
+  The belief corrected by a measurement of this variance, which has passed a gate: its innovation `error` (measured minus expected
+  value), and the derivatives of the expected value by x, y and heading.
   """
-  @spec fits?(t(), float(), {float(), float(), float()}, noise :: float()) :: boolean()
-  def fits?(belief, error, slope, noise),
-    do: error * error <= @gate * (variance(belief, slope) + noise)
-
-  @doc "The belief corrected by such a measurement, without asking the gate."
   @spec measured(t(), float(), {float(), float(), float()}, noise :: float()) :: t()
   def measured(belief, error, {a, b, c}, noise) do
     {v, variance} = Covariance.project(belief.covariance, [a, b, c])
