@@ -251,7 +251,7 @@ defmodule Robot.Localiser do
   end
 
   # A plan is in the frame of the start poses.
-  defp hear(%{frame: nil} = localiser, percept) do
+  defp hear(%{frame: nil, anchors: %{walls?: true}} = localiser, percept) do
     {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
     %{localiser | walls: walls, belief: belief}
   end
