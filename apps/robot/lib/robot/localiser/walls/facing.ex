@@ -3,14 +3,14 @@ defmodule Robot.Localiser.Walls.Facing do
   What a sonar should hear by a floor plan: the wall that it faces squarely, because any other throws the echo elsewhere. Pure;
   metres and radians, in the frame of the map.
 
-  Rays over the cone find what comes first. The distance of that from the sonar, and the direction in which it faces, follow
-  from the clearances before it (`Robot.Navigation.Grid`), which are finer than the cells.
+  A ray along the axis of the sonar finds the wall. Its distance, and the direction in which it faces, follow from the clearances
+  before it (`Robot.Navigation.Grid`), which are finer than the cells. More rays look for what else is in the cone and nearer.
   """
   alias Hal.Pose
   alias Robot.Navigation.Grid
 
-  # Directions of the rays, as shares of half the cone.
-  @rays [0.0, -0.5, 0.5, -1.0, 1.0]
+  # Directions beside the axis in which nothing may be nearer, as shares of half the cone.
+  @rays [-0.5, 0.5, -1.0, 1.0]
   # The least step of a ray, and how far before the wall its clearances are taken.
   @step 0.06
   @before 0.25
@@ -31,48 +31,57 @@ defmodule Robot.Localiser.Walls.Facing do
   @doc "The wall that a sonar at this pose faces within `most` metres; `nil` for none, or none that it would surely hear."
   @spec find(Grid.t(), Pose.t(), cone :: float(), most :: float()) :: t() | nil
   def find(%Grid{} = grid, %Pose{} = sonar, cone, most) do
-    {t, c, s} =
-      for share <- @rays, reduce: {most, 1.0, 0.0} do
-        {best, _, _} = found ->
-          angle = sonar.heading + share * cone / 2
-          {c, s} = {:math.cos(angle), :math.sin(angle)}
-          t = cast(grid, sonar.x, sonar.y, c, s, best, 0.0)
-          if t < best, do: {t, c, s}, else: found
-      end
+    t = cast(grid, sonar, 0.0, most)
 
-    if t < most, do: facing(grid, sonar, cone, {t, c, s}), else: nil
+    with true <- t < most,
+         {distance, _normal} = wall <- facing(grid, sonar, cone, t),
+         least = distance - @same,
+         true <- Enum.all?(@rays, &(cast(grid, sonar, &1 * cone / 2, least) >= least)) do
+      wall
+    else
+      _none -> nil
+    end
   end
 
-  defp cast(_grid, _x, _y, _c, _s, most, t) when t >= most, do: most
+  # How far a ray comes that leaves the sonar at this angle.
+  defp cast(grid, sonar, angle, most) do
+    {c, s} = {:math.cos(sonar.heading + angle), :math.sin(sonar.heading + angle)}
+    march(grid, sonar.x, sonar.y, c, s, most, 0.0)
+  end
 
-  defp cast(grid, x, y, c, s, most, t) do
+  defp march(_grid, _x, _y, _c, _s, most, t) when t >= most, do: t
+
+  defp march(grid, x, y, c, s, most, t) do
     clear = Grid.clearance(grid, {x + t * c, y + t * s})
+    step = clear - 0.71 * grid.cell
 
-    if clear > 0.0,
-      do: cast(grid, x, y, c, s, most, t + max(clear - 0.71 * grid.cell, @step)),
-      else: t
+    cond do
+      clear == 0.0 -> t
+      step > @step -> march(grid, x, y, c, s, most, t + step)
+      true -> march(grid, x, y, c, s, most, t + @step)
+    end
   end
 
-  defp facing(grid, sonar, cone, {t, c, s}) do
+  defp facing(grid, sonar, cone, t) do
+    {c, s} = {:math.cos(sonar.heading), :math.sin(sonar.heading)}
     ahead = max(t - @before, 0.0)
     {x, y} = at = {sonar.x + ahead * c, sonar.y + ahead * s}
     {gx, gy} = slope(grid, at)
     steep = :math.sqrt(gx * gx + gy * gy)
 
-    if steep > @straight do
+    # The cosine of the angle between the sonar and the wall's normal.
+    if steep > @straight and -(gx * c + gy * s) >= steep * :math.cos(cone / 2) do
       {nx, ny} = {gx / steep, gy / steep}
       clear = between(grid, at)
       distance = clear + @shy + nx * (sonar.x - x) + ny * (sonar.y - y)
-      aside = abs(Pose.wrap(:math.atan2(-ny, -nx) - sonar.heading))
-
-      flat? =
-        Enum.all?([-@side, @side], fn side ->
-          abs(between(grid, {x - side * ny, y + side * nx}) - clear) < @flat
-        end)
-
-      if aside <= cone / 2 and abs(distance - t) < @same and flat?,
-        do: {distance, {nx, ny}}
+      if abs(distance - t) < @same and flat?(grid, at, {nx, ny}, clear), do: {distance, {nx, ny}}
     end
+  end
+
+  defp flat?(grid, {x, y}, {nx, ny}, clear) do
+    Enum.all?([-@side, @side], fn side ->
+      abs(between(grid, {x - side * ny, y + side * nx}) - clear) < @flat
+    end)
   end
 
   defp slope(grid, {x, y}) do
