@@ -19,7 +19,7 @@ defmodule Robot.Localiser.Walls do
   alias Robot.Percept
 
   # A round of readings is taken after so much way or turn (metres, radians).
-  @moved 0.15
+  @moved 0.25
   @turned 0.2
   # Walls between these (metres) count.
   @near 0.2
