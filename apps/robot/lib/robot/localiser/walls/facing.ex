@@ -24,6 +24,8 @@ defmodule Robot.Localiser.Walls.Facing do
   @flat 0.06
   # The wall by its clearances must be where the ray ended (metres).
   @same 0.15
+  # What else is in the cone may be nearer by this (metres).
+  @nearer 0.1
 
   @typedoc "The distance of a wall from the sonar along its normal, and the unit normal, towards the sonar."
   @type t :: {distance :: float(), normal :: {float(), float()}}
@@ -35,7 +37,7 @@ defmodule Robot.Localiser.Walls.Facing do
 
     with true <- t < most,
          {distance, _normal} = wall <- facing(grid, sonar, cone, t),
-         least = distance - @same,
+         least = distance - @nearer,
          true <- Enum.all?(@rays, &(cast(grid, sonar, &1 * cone / 2, least) >= least)) do
       wall
     else
