@@ -1,8 +1,9 @@
 defmodule Robot.Localiser do
   @moduledoc """
   Estimates a robot's pose and its uncertainty: odometry from its start pose, corrected by
-  sightings of objects whose places it was given (`Robot.Localiser.Anchors`). Pure; the filter is
-  `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns pictures into corrections.
+  sightings of objects whose places it was given (`Robot.Localiser.Anchors`), or by the walls of a
+  floor plan. Pure; the filter is `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns
+  pictures into corrections, `Robot.Localiser.Walls` sonar ranges.
 
   The anchors should come only from the leader and from robots nearer to it in the order, so that
   no robot corrects itself with data that derives from its own pose.
@@ -131,8 +132,8 @@ defmodule Robot.Localiser do
     do: {a + position, b + heading}
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's detections, and fills
-  in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
+  Moves the estimate by the percept's odometry, corrects it by the percept's detections and, if its
+  `grid` is a floor plan, by its sonars, and fills in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
   there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
