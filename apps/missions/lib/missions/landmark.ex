@@ -139,9 +139,9 @@ defmodule Missions.Landmark do
   # it leads for the first time, nobody has taken its places from it.
   defp unled(%{phase: phase, leadership: %{sequence: 0}, colour: colour})
        when phase in [:search, :agree],
-       do: %Anchors{standing: colour}
+       do: %Anchors{standing: colour, walls?: false}
 
-  defp unled(_mission), do: %Anchors{}
+  defp unled(_mission), do: %Anchors{walls?: false}
 
   defp hear({:ok, %Message{kind: :round, from: from, body: letter} = message}, mission) do
     {mission, relays} = relay_letter(mission, message)

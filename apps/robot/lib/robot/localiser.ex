@@ -1,8 +1,9 @@
 defmodule Robot.Localiser do
   @moduledoc """
   Estimates a robot's pose and its uncertainty: odometry from its start pose, corrected by
-  sightings of objects whose places it was given (`Robot.Localiser.Anchors`). Pure; the filter is
-  `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns pictures into corrections.
+  sightings of objects whose places it was given (`Robot.Localiser.Anchors`), or by the walls of a
+  floor plan. Pure; the filter is `Robot.Localiser.Belief`, and `Robot.Localiser.Sightings` turns
+  pictures into corrections, `Robot.Localiser.Walls` sonar ranges.
 
   The anchors should come only from the leader and from robots nearer to it in the order, so that
   no robot corrects itself with data that derives from its own pose.
@@ -13,7 +14,7 @@ defmodule Robot.Localiser do
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Departure
-  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck}
+  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck, Walls}
   alias Robot.Localiser.Belief.Marks
   alias Robot.Percept
 
@@ -35,7 +36,8 @@ defmodule Robot.Localiser do
                 anchors: %Anchors{},
                 frame: nil,
                 frame_no: nil,
-                turn_check: nil
+                turn_check: nil,
+                walls: %Walls{}
               ]
 
   # Frame numbers are sent to other robots, which accept none above half a billion.
@@ -58,7 +60,8 @@ defmodule Robot.Localiser do
           anchors: Anchors.t(),
           frame: Anchors.frame() | nil,
           frame_no: non_neg_integer() | nil,
-          turn_check: TurnCheck.t()
+          turn_check: TurnCheck.t(),
+          walls: Walls.t()
         }
 
   @doc """
@@ -129,8 +132,8 @@ defmodule Robot.Localiser do
     do: {a + position, b + heading}
 
   @doc """
-  Moves the estimate by the percept's odometry, corrects it by the percept's detections, and fills
-  in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
+  Moves the estimate by the percept's odometry, corrects it by the percept's detections and, if its
+  `grid` is a floor plan, by its sonars, and fills in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
   there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
@@ -145,6 +148,7 @@ defmodule Robot.Localiser do
       |> move(odometry.pose)
       |> remember(percept.at_ms)
       |> see(percept)
+      |> hear(percept)
       |> found()
 
     percept = exposed(percept, localiser)
@@ -202,6 +206,7 @@ defmodule Robot.Localiser do
         odometry: nil,
         history: History.new(),
         turn_check: nil,
+        walls: %Walls{},
         belief: Belief.doubt(localiser.belief)
     }
 
@@ -245,6 +250,14 @@ defmodule Robot.Localiser do
         %{localiser | seen_ms: at_ms, belief: belief}
     end
   end
+
+  # A plan is in the frame of the start poses.
+  defp hear(%{frame: nil, anchors: %{walls?: true}} = localiser, percept) do
+    {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
+    %{localiser | walls: walls, belief: belief}
+  end
+
+  defp hear(localiser, _percept), do: %{localiser | walls: %Walls{}}
 
   # A robot that was never led: nobody knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do

@@ -119,8 +119,8 @@ defmodule Missions.Landmark.Leader do
         do: [],
         else: [{:claim, told, %{anchor: mission.anchor}}]
 
-    {mission,
-     formed ++ lost ++ no_room ++ place ++ [goal(mission), {:look, 0.0}, {:anchors, %Anchors{}}]}
+    orders = [goal(mission), {:look, 0.0}, {:anchors, %Anchors{walls?: false}}]
+    {mission, formed ++ lost ++ no_room ++ place ++ orders}
   end
 
   # When enough followers for a majority last reported that they hear this leader.

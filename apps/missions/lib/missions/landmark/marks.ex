@@ -54,7 +54,8 @@ defmodule Missions.Landmark.Marks do
         }
       end
 
-    %Anchors{frame: frame(mission, leader), marks: landmark(mission) ++ robots}
+    marks = landmark(mission) ++ robots
+    %Anchors{frame: frame(mission, leader), marks: marks, walls?: false}
   end
 
   defp neighbours(%{peers: peers}, _ahead) when map_size(peers) <= @nearest, do: peers

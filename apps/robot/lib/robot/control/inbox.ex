@@ -35,10 +35,15 @@ defmodule Robot.Control.Inbox do
   def order?({:goal, _tag, goal}), do: Robot.Behaviour.check(goal) == :ok
   def order?({:look, pan}), do: pan == nil or is_measure(pan)
 
-  def order?({:anchors, %{__struct__: Anchors, frame: frame, marks: marks, standing: standing}}),
-    do: frame?(frame) and all?(marks, &mark?/1) and (standing == nil or is_binary(standing))
+  def order?({:anchors, %{__struct__: Anchors, frame: frame, marks: marks} = anchors}),
+    do: frame?(frame) and all?(marks, &mark?/1) and rest?(anchors)
 
   def order?(_other), do: false
+
+  defp rest?(%{standing: standing, walls?: walls?}),
+    do: (standing == nil or is_binary(standing)) and is_boolean(walls?)
+
+  defp rest?(_anchors), do: false
 
   defp frame?(nil), do: true
 

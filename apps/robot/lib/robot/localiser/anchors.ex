@@ -7,10 +7,14 @@ defmodule Robot.Localiser.Anchors do
   Its uncertainty is therefore part of the uncertainty of every robot in its frame. A robot that
   joins the frame takes over the uncertainty of the leader's pose in the frame that the leader was
   in before (`base`), and from then on what the leader's odometry adds.
+
+  `standing` is the colour of a standing object whose place is unknown (`Robot.Localiser.TurnCheck`). `walls?` tells whether the
+  walls of a floor plan may correct the pose, too (`Robot.Localiser.Walls`): not where robots take their places from each
+  other, because a correction of one would have to move them all.
   """
   alias Hal.Pose
 
-  defstruct frame: nil, marks: [], standing: nil
+  defstruct frame: nil, marks: [], standing: nil, walls?: true
 
   # Standard deviations count as at least this much, and places nearer to each other than this as
   # the same; in metres.

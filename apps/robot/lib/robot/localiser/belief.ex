@@ -253,6 +253,17 @@ defmodule Robot.Localiser.Belief do
       else: believe(belief, v, error / s, reduce(belief.covariance, v, s))
   end
 
+  @doc """
+  The belief corrected by a measurement of this variance, which has passed a gate: its innovation `error` (measured minus expected
+  value), and the derivatives of the expected value by x, y and heading.
+  """
+  @spec measured(t(), float(), {float(), float(), float()}, noise :: float()) :: t()
+  def measured(belief, error, {a, b, c}, noise) do
+    {v, variance} = Covariance.project(belief.covariance, [a, b, c])
+    s = variance + noise
+    believe(belief, v, error / s, reduce(belief.covariance, v, s))
+  end
+
   # The gain of the common error is zero: its covariances shrink, its variance does not.
   defp reduce(covariance, v, s) do
     covariance

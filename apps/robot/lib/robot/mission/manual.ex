@@ -8,7 +8,8 @@ defmodule Robot.Mission.Manual do
   that it follows, so that a command that would close a circle of followers can be refused.
 
   Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
-  (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why.
+  (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why. One that ends
+  where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
   subscription asks for (R27, R35), so robots refuse a subscription. A follower keeps 1 m behind
@@ -24,6 +25,8 @@ defmodule Robot.Mission.Manual do
 
   @behind 1.0
   @silent_ms 1_000
+  # It has not surely arrived at a place if it may be this far from there (metres).
+  @unsure 0.5
 
   @enforce_keys [:me]
   defstruct @enforce_keys ++ [count: 0, command: nil, result: nil, why: nil]
@@ -65,6 +68,18 @@ defmodule Robot.Mission.Manual do
     gone = {:stage, :given_up, %{x: x, y: y, blocked_by: why}}
     claim = {:claim, %{phase: :idle, standing: true, blocked_by: why}}
     result(%{mission | why: why}, [gone, claim])
+  end
+
+  def handle(
+        {:tick, %Percept{uncertainty: %{radius: radius}}},
+        %{command: {:goto, _x, _y, _heading}, result: 1, why: nil} = mission
+      )
+      when radius > @unsure do
+    says =
+      "there by its own estimate, which may be #{:erlang.float_to_binary(radius, decimals: 1)} m off"
+
+    claim = {:claim, %{phase: :idle, standing: true, says: says}}
+    result(%{mission | why: says}, [claim])
   end
 
   # The followed robot moves, and its heartbeats may end.

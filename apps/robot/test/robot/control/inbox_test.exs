@@ -93,6 +93,7 @@ defmodule Robot.Control.InboxTest do
       %Anchors{marks: [1 | 2]},
       %Anchors{marks: [%{}]},
       %Anchors{frame: %{at: {0, 0}}},
+      %Anchors{walls?: nil},
       Map.delete(%Anchors{}, :frame)
     ]
   end

@@ -28,6 +28,16 @@ defmodule Robot.Mission.ManualTest do
              Manual.handle({:outcome, next, 1}, mission)
   end
 
+  test "says of a place that it may be elsewhere, if it is not sure of its pose" do
+    unsure = fn radius -> %{percept(100, %{}) | uncertainty: %{radius: radius}} end
+    {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2:1")
+    {:done, mission, _claim} = Manual.handle({:outcome, tag, 1}, mission)
+    assert {:done, ^mission, []} = Manual.handle({:tick, unsure.(0.4)}, mission)
+    assert {:done, mission, [{:claim, claim}]} = Manual.handle({:tick, unsure.(1.24)}, mission)
+    assert claim.says == "there by its own estimate, which may be 1.2 m off"
+    assert {:done, ^mission, []} = Manual.handle({:tick, unsure.(1.24)}, mission)
+  end
+
   test "whether a colour was found is its phase, and not only that it is done" do
     for {outcome, phase} <- [{1, :found}, {0, :not_found}] do
       {:find_blob, mission, [{:goal, tag, _} | _]} = tell(new(), "findblob:Red")

@@ -92,7 +92,13 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
   defp reading(range, _profile, false),
     do: {min(range - @margin, @through), if(range <= @heard, do: 1.0, else: 0.0)}
 
-  # Whether an echo of this range can come from a disc.
+  @doc "Whether an echo of this range (metres), heard by a sonar at this pose with a cone of this width, can come from a disc."
+  @spec sent?(disc(), Pose.t(), range :: float(), cone :: float()) :: boolean()
+  def sent?(disc, %Pose{x: x, y: y, heading: heading}, range, cone) do
+    {c, s} = {:math.cos(heading), :math.sin(heading)}
+    sent?(disc, x, y, c, s, range, :math.tan(cone / 2), @explained)
+  end
+
   defp sent?({dx, dy, radius}, x, y, c, s, range, tangent, near) do
     {dx, dy} = {dx - x, dy - y}
     along = dx * c + dy * s

@@ -1,0 +1,131 @@
+defmodule Robot.Localiser.Walls do
+  @moduledoc """
+  Corrects a belief by what the sonars hear of the walls of a floor plan (`Robot.Navigation.Grid`). Pure.
+
+  Every few decimetres each range is compared with that of the flat wall which its sonar should face squarely
+  (`Robot.Localiser.Walls.Facing`), and is a measurement of the extended Kalman filter `Robot.Localiser.Belief` along the normal of
+  that wall. A gate leaves out what something else explains. The readings of a robot by the same walls are not independent, so
+  they count as less exact than they are, and never make the pose surer than the plan is.
+
+  A plan may be wrong: of another floor, or drawn before a wall was moved. `Robot.Localiser.Walls.Trust` decides that. The belief
+  without the corrections since the plan was last surely right is kept (`dead`), and takes over when the plan is found to be
+  wrong, so that the robot goes on by dead reckoning.
+  """
+  alias Hal.Pose
+  alias Robot.Localiser.Belief
+  alias Robot.Localiser.Walls.{Facing, Trust}
+  alias Robot.Navigation.Grid
+  alias Robot.Navigation.OccupancyGrid.Cones
+  alias Robot.Percept
+
+  # A round of readings is taken after so much way or turn (metres, radians).
+  @moved 0.25
+  @turned 0.2
+  # Walls between these (metres) count.
+  @near 0.2
+  @far 4.5
+  # The standard deviation of a range (metres), several times that of a sonar, and how exact a plan is.
+  @sd 0.15
+  @exact 0.04
+  # A pose that is less sure than this (metres, radians) is not corrected: it would expect other walls than those that it hears.
+  @vague {1.0, 0.4}
+  @gate 9.0
+
+  defstruct at: nil, dead: nil, trust: %Trust{}
+
+  @typedoc "`at` is the odometry at the last round."
+  @type t :: %__MODULE__{at: Pose.t() | nil, dead: Belief.t() | nil, trust: Trust.t()}
+
+  @doc "The belief corrected by the percept's sonars, if its `grid` is a floor plan and a round is due."
+  @spec correct(t(), Belief.t(), Percept.t()) :: {t(), Belief.t()}
+  def correct(walls, belief, %Percept{sonar: ranges, grid: %Grid{closed?: true}} = percept)
+      when ranges != nil do
+    now = percept.odometry.pose
+
+    cond do
+      walls.at == nil ->
+        {%{walls | at: now, dead: belief}, belief}
+
+      Cones.moved?(walls.at, now, @moved, @turned) ->
+        dead = Belief.move(walls.dead, Pose.relative(walls.at, now))
+        listen(%{walls | at: now, dead: dead}, belief, percept)
+
+      true ->
+        {walls, belief}
+    end
+  end
+
+  def correct(walls, belief, _percept), do: {walls, belief}
+
+  defp listen(walls, belief, percept) do
+    if vague?(belief) do
+      {walls, belief}
+    else
+      {corrected, got, could} = round(belief, percept)
+      {verdict, trust} = Trust.weigh(walls.trust, got, could)
+      follow(verdict, %{walls | trust: trust}, belief, corrected, walls.trust.trusted?)
+    end
+  end
+
+  defp vague?(belief) do
+    {worst, _least, heading} = Belief.sd(belief)
+    {position, turn} = @vague
+    worst > position or heading > turn
+  end
+
+  defp follow(:right, walls, _belief, corrected, _trusted?),
+    do: {%{walls | dead: corrected}, corrected}
+
+  defp follow(:fair, walls, _belief, corrected, _trusted?), do: {walls, corrected}
+  defp follow(:unfair, walls, belief, _corrected, _trusted?), do: {walls, belief}
+  defp follow(:wrong, walls, _belief, _corrected, true), do: {walls, walls.dead}
+  defp follow(:wrong, walls, belief, _corrected, false), do: {walls, belief}
+
+  # One reading after the other, so that the second one by the same wall is expected where the first one was.
+  defp round(belief, %{profile: profile, odometry: odometry} = percept) do
+    late = odometry.twist.linear * profile.sonar_round_s / 2
+    noise = @sd * @sd + late * late
+
+    for {mount, range} <- Enum.zip(profile.sonars, percept.sonar),
+        is_number(range),
+        sonar = Pose.compose(belief.pose, mount),
+        {distance, normal} <- faced(percept.grid, sonar, profile.sonar_cone),
+        not others?(percept, sonar, range),
+        reduce: {belief, 0.0, 0.0} do
+      {now, got, could} ->
+        slope = slope(belief.pose, sonar, normal)
+        variance = Belief.variance(now, slope)
+        s = variance + noise
+        error = range - distance - along(slope, belief.pose, now.pose)
+
+        corrected =
+          if variance > @exact * @exact and error * error <= @gate * s,
+            do: Belief.measured(now, error, slope, noise),
+            else: now
+
+        {corrected, got + Trust.evidence(error, s), could + Trust.evidence(0.0, s)}
+    end
+  end
+
+  defp faced(grid, sonar, cone) do
+    case Facing.find(grid, sonar, cone, @far) do
+      {distance, _normal} = faced when distance > @near -> [faced]
+      _none -> []
+    end
+  end
+
+  defp others?(%{peers: peers}, _sonar, _range) when peers == %{}, do: false
+
+  defp others?(%{peers: peers, profile: profile}, sonar, range) do
+    Enum.any?(peers, fn {_id, %{pose: pose, radius: radius}} ->
+      Cones.sent?({pose.x, pose.y, radius}, sonar, range, profile.sonar_cone)
+    end)
+  end
+
+  # The sonar swings about the middle of the robot as that turns.
+  defp slope(pose, sonar, {nx, ny}),
+    do: {nx, ny, ny * (sonar.x - pose.x) - nx * (sonar.y - pose.y)}
+
+  defp along({a, b, c}, from, to),
+    do: a * (to.x - from.x) + b * (to.y - from.y) + c * Pose.wrap(to.heading - from.heading)
+end

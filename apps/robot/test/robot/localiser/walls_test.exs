@@ -1,0 +1,80 @@
+defmodule Robot.Localiser.WallsTest do
+  use ExUnit.Case, async: true
+  alias Hal.Pose
+  alias Robot.{Localiser, Room}
+  alias Robot.Localiser.Anchors
+
+  @size {6.0, 4.0}
+  @start Pose.new(1.0, 1.0)
+  @corners [{5.0, 1.0}, {5.0, 3.0}, {1.0, 3.0}, {1.0, 1.0}]
+
+  # Drives round the room on wheels that slip as those of a skid-steered base do (R74): true poses, and those of odometry.
+  defp drive(rounds) do
+    List.duplicate(@corners, rounds)
+    |> Enum.concat()
+    |> Enum.reduce({@start, Pose.new(0, 0), []}, &leg/2)
+    |> elem(2)
+    |> Enum.reverse()
+  end
+
+  defp leg(corner, {pose, odometry, track}) do
+    bearing = Pose.bearing(pose, corner)
+
+    cond do
+      Pose.distance(pose, corner) < 0.05 -> {pose, odometry, track}
+      abs(bearing) > 0.05 -> leg(corner, step(pose, odometry, track, 0.0, bearing))
+      true -> leg(corner, step(pose, odometry, track, 0.05, 0.0))
+    end
+  end
+
+  defp step(pose, odometry, track, way, bearing) do
+    turn = bearing |> max(-0.1) |> min(0.1)
+    slip = if turn > 0.0, do: 1.055, else: 0.945
+    pose = Pose.compose(pose, Pose.new(way, 0.0, turn))
+    odometry = Pose.compose(odometry, Pose.new(way, 0.0, turn / slip + 0.003 * :rand.normal()))
+    {pose, odometry, [{pose, odometry} | track]}
+  end
+
+  # How far the estimate is from the truth at the end, and whether it says so.
+  defp follow(track, plan, localiser \\ Localiser.new(@start)) do
+    {percept, localiser} =
+      track
+      |> Enum.with_index()
+      |> Enum.reduce({nil, localiser}, fn {{pose, odometry}, k}, {_percept, localiser} ->
+        Localiser.update(localiser, Room.percept(@size, pose, odometry, 100 * k, plan))
+      end)
+
+    {pose, _odometry} = List.last(track)
+    {Pose.distance(percept.pose, pose), percept.uncertainty.radius, localiser}
+  end
+
+  test "stays within 15 cm past known walls where dead reckoning is off by metres" do
+    for _ <- 1..3 do
+      track = drive(2)
+      {off, radius, localiser} = follow(track, Room.plan(@size))
+      {dead, _radius, _localiser} = follow(track, nil)
+      assert dead > 0.5
+      assert off < 0.15
+      assert radius < 0.3
+      assert localiser.walls.trust.trusted?
+    end
+  end
+
+  test "with a wrong plan it finds out, and goes on by dead reckoning" do
+    for size <- [{9.0, 4.6}, {4.8, 7.0}] do
+      track = drive(2)
+      {off, radius, localiser} = follow(track, Room.plan(size))
+      {dead, dead_radius, _localiser} = follow(track, nil)
+      refute localiser.walls.trust.trusted?
+      assert off < dead + 0.2
+      assert radius > 0.8 * dead_radius
+    end
+  end
+
+  test "corrects nothing where robots take their places from each other" do
+    track = drive(1)
+    localiser = Localiser.anchors(Localiser.new(@start), %Anchors{walls?: false})
+    {off, radius, _localiser} = follow(track, Room.plan(@size), localiser)
+    assert {^off, ^radius, _localiser} = follow(track, nil)
+  end
+end
