@@ -24,7 +24,7 @@ defmodule Agents.Responder do
   `:failure`, the event `[:swarm, :responder, :failure]` reports it, and the state is kept:
   otherwise four bad envelopes within five seconds would end the robot.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Robot.Names
   alias Agents.{Conversation, Envelope, Inbox}
@@ -123,10 +123,6 @@ defmodule Agents.Responder do
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Inbox.counts(s.inbox), s}
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(message, s) do

@@ -25,7 +25,7 @@ defmodule Vision.BlobDetector do
   A camera's device passes its frames on by the sink `{Vision.BlobDetector, :frame, [detector]}`,
   a pan-tilt unit's device its readings by `{Vision.BlobDetector, :aim, [detector]}`.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Frame, HardenedServer, Ptz}
   alias Vision.{Colours, Detections}
 
@@ -95,14 +95,8 @@ defmodule Vision.BlobDetector do
     end
   end
 
-  def handle_cast(_unknown, state), do: HardenedServer.drop(state)
-
   @impl GenServer
   def handle_call(:status, _from, state), do: {:reply, state.counts, state}
-  def handle_call(_unknown, _from, state), do: HardenedServer.drop(state)
-
-  @impl GenServer
-  def handle_info(_unknown, state), do: HardenedServer.drop(state)
 
   # Frames that have come in the meantime are further down in the mailbox.
   defp newest(frame, dropped) do

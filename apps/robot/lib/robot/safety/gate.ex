@@ -17,7 +17,7 @@ defmodule Robot.Safety.Gate do
   (`Robot.Safety.DryRun`) it also commands it only to stand, and reports what it would have
   commanded.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
   alias Robot.{Board, Names}
   alias Robot.Trace
@@ -134,8 +134,6 @@ defmodule Robot.Safety.Gate do
     {:noreply, s |> frame(reflex, at_ms) |> react(urgency, at_ms)}
   end
 
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_call({:estop, tell?}, from, s) when is_boolean(tell?) do
     at_ms = heard(s, :estop)
@@ -159,8 +157,6 @@ defmodule Robot.Safety.Gate do
       else: {:reply, :ok, cleared(s, tell?)}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   defp forgotten(s, then) do
     at_ms = heard(s, :forget)
     {reflex, urgency} = Reflex.forget(s.reflex)
@@ -183,8 +179,6 @@ defmodule Robot.Safety.Gate do
     Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
     {:noreply, s |> step(at_ms) |> schedule()}
   end
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp state(s), do: {s.reflex, %{dry_run: s.config.dry_run}}
 
