@@ -5,6 +5,7 @@ defmodule Console.Cli.Arguments do
   Written for values that begin with a minus sign (`--landmark -2,1`), for options that may be
   repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
   is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
+  Every command also takes `--help`, or `-h`.
   """
   alias Hal.Options.Wording
   alias Hal.Options.Suggest
@@ -14,6 +15,8 @@ defmodule Console.Cli.Arguments do
   @type check :: (String.t() -> {:ok, term()} | {:error, allowed()})
   @type option ::
           {name :: String.t(), hint :: String.t() | nil, check() | nil, help :: String.t()}
+
+  @help {"help", nil, nil, "this text"}
 
   @doc """
   The values in the order in which they were given, or one line for each error.
@@ -31,7 +34,8 @@ defmodule Console.Cli.Arguments do
   @spec parse([String.t()], [option()]) ::
           {:ok, [{String.t(), term()}]} | {:error, [String.t()]}
   def parse(arguments, options) do
-    results = read(arguments, options)
+    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
+    results = read(arguments, options ++ [@help])
 
     case for {:error, line} <- results, do: line do
       [] -> {:ok, for({:ok, pair} <- results, do: pair)}
@@ -70,7 +74,9 @@ defmodule Console.Cli.Arguments do
   @doc "The options as aligned lines for a help text."
   @spec help([option()]) :: String.t()
   def help(options) do
-    rows = Enum.map(options, fn {name, hint, _check, help} -> {usage(name, hint), help} end)
+    rows =
+      Enum.map(options ++ [@help], fn {name, hint, _check, help} -> {usage(name, hint), help} end)
+
     width = rows |> Enum.map(fn {left, _help} -> String.length(left) end) |> Enum.max()
 
     Enum.map_join(rows, "\n", fn {left, help} ->

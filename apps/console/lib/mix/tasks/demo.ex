@@ -12,7 +12,6 @@ defmodule Mix.Tasks.Demo do
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
-  alias Hal.CommandBuild
   alias Console.Terminal.Session
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
@@ -22,14 +21,11 @@ defmodule Mix.Tasks.Demo do
   @nodes_a_processor 15
 
   @impl Mix.Task
-  def run(arguments), do: Hal.CommandOutput.run("demo", fn -> demo(arguments) end)
+  def run(arguments) do
+    Console.Cli.Command.run("demo", fn ->
+      # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
+      Logger.configure(level: :none)
 
-  defp demo(arguments) do
-    CommandBuild.update()
-    # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
-    Logger.configure(level: :none)
-
-    status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} ->
           IO.write(Options.help())
@@ -37,18 +33,10 @@ defmodule Mix.Tasks.Demo do
         {:ok, options} ->
           with :ok <- Report.check(options), :ok <- doors(options), do: play(options)
 
-        {:error, lines} ->
-          {:error, lines}
+        errors ->
+          errors
       end
-
-    status =
-      with {:error, lines} <- status do
-        lines |> List.wrap() |> Enum.each(&IO.puts(:stderr, "demo: #{&1}"))
-        IO.puts(:stderr, "demo: --help lists all options")
-        1
-      end
-
-    if is_integer(status) and status > 0, do: exit({:shutdown, status})
+    end)
   end
 
   # What a node lets in is decided when its Erlang starts.

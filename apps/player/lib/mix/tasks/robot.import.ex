@@ -38,25 +38,9 @@ defmodule Mix.Tasks.Robot.Import do
   @largest 1_048_576
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("robot.import", fn -> command(words) end)
-
-  defp command(words) do
-    case OptionParser.parse(words, strict: @switches, aliases: [o: :out]) do
-      {_options, _files, [{word, nil} | _]} ->
-        refuse("#{word} is not an option; --help lists them")
-
-      {_options, _files, [{word, value} | _]} ->
-        refuse("#{word} cannot be #{value}; --help explains")
-
-      {options, files, []} ->
-        run(options, files)
-    end
-  end
-
-  defp run(options, files) do
-    if options[:help],
-      do: Mix.shell().info(@moduledoc),
-      else: with({:error, line} <- carry_over(options, files), do: refuse(line))
+  def run(words) do
+    parser = [strict: @switches, aliases: [o: :out]]
+    Hal.CommandOutput.run("robot.import", words, @moduledoc, parser, &carry_over/2)
   end
 
   defp carry_over(options, files) do
@@ -197,9 +181,4 @@ defmodule Mix.Tasks.Robot.Import do
 
   # Standard output may hold the robot file.
   defp say(line), do: IO.puts(:stderr, line)
-
-  defp refuse(line) do
-    Mix.shell().error(line)
-    exit({:shutdown, 1})
-  end
 end

@@ -114,9 +114,9 @@ defmodule Mix.Tasks.Robot.ImportTest do
     for {words, line} <- [
           {[], "FILE is missing: mix robot.import FILE"},
           {[file, file], "one file at a time, not 2"},
-          {[file, "--outt", "x"], "--outt is not an option; --help lists them"},
+          {[file, "--outt", "x"], "unknown option --outt; did you mean --out?"},
           {[file, "--player", "3"], "--player cannot be 3: 1 for 1.x, 2 for later ones"},
-          {[file, "--player", "x"], "--player cannot be x; --help explains"},
+          {[file, "--player", "x"], "--player cannot be x"},
           {[file, "--profile", "magelan"],
            "--profile cannot be magelan: magellan or atrv_mini; did you mean magellan?"},
           {[file, "--name", "rover"],
