@@ -76,6 +76,10 @@ defmodule Missions.Landmark do
   def commands, do: [:formation]
 
   @impl Robot.Mission
+  def roles,
+    do: %{lead: :leads, follow: :follows, search: :searches, rest: :rests, elected: :elects}
+
+  @impl Robot.Mission
   defdelegate explain(mission), to: Landmark.Explanation, as: :lines
 
   @impl Robot.Mission

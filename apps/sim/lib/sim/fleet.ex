@@ -128,7 +128,7 @@ defmodule Sim.Fleet do
       backend: backend,
       epoch_ms: epoch_ms,
       script: Script.new(options.moves, options.kills),
-      run_log: RunLog.new(),
+      run_log: RunLog.new(elem(setup.mission, 0)),
       said: [],
       ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)

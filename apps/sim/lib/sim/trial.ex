@@ -84,7 +84,7 @@ defmodule Sim.Trial do
         ),
       members: members,
       script: Script.new(options.moves, options.kills, options.script),
-      run_log: RunLog.new(),
+      run_log: RunLog.new(elem(setup.mission, 0)),
       colours: World.colours()
     }
   end

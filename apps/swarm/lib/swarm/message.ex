@@ -57,6 +57,12 @@ defmodule Swarm.Message do
         ) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
 
+  @doc "What a robot's mission sends, as a message of this robot."
+  @spec of(atom(), t() | Robot.Mission.Letter.t() | Robot.Mission.Claim.t()) :: t()
+  def of(from, %Robot.Mission.Letter{} = letter), do: new(from, :mission, letter)
+  def of(from, %Robot.Mission.Claim{} = claim), do: new(from, :claim, claim)
+  def of(_from, %__MODULE__{} = message), do: message
+
   @doc """
   Another robot's message as this robot passes it on; `:error` if it has been passed on often
   enough.

@@ -60,9 +60,8 @@ defmodule Sim.Trial.Event do
 
   defp under(_key, result), do: result
 
-  @doc "All events, as forms of `Sim.Trial.Form`."
-  @spec forms() :: [Form.form()]
-  def forms do
+  # All events, as forms of `Sim.Trial.Form`.
+  defp forms do
     metres = {:number, -1.0e4, 1.0e4, "m"}
     place = {:tuple, [metres, metres], "{x, y} in metres"}
     degrees = {:number, -36_000, 36_000, "degrees"}

@@ -100,7 +100,7 @@ defmodule Sim.Trial.PartitionTest do
 
   test "two that lead in one part are counted for as long as they do, and only there" do
     lead = fn ids ->
-      for id <- [:a, :b], do: {id, %{phase: if(id in ids, do: :lead, else: :follow)}}
+      for id <- [:a, :b], do: {id, %{role: if(id in ids, do: :leads, else: :follows)}}
     end
 
     agreement =
