@@ -63,8 +63,6 @@ defmodule Console.Options do
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table(folder)),
          {:ok, options} <- fleet(pairs) do
       pairs
@@ -196,8 +194,7 @@ the prompt then takes pause, step, speed"},
       Page.table() ++
       [
         {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
-         "paint camera pictures, or skip the painting (painted)"},
-        {"help", nil, nil, "this text"}
+         "paint camera pictures, or skip the painting (painted)"}
       ]
   end
 

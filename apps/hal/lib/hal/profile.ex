@@ -115,16 +115,6 @@ defmodule Hal.Profile do
     }
   end
 
-  @doc """
-  The profile of a robot, by the first three letters of its name as in the thesis: `mag1`, `min3`.
-
-      iex> Hal.Profile.of_kind(:mag).name
-      :magellan
-  """
-  @spec of_kind(:mag | :min) :: t()
-  def of_kind(:mag), do: magellan()
-  def of_kind(:min), do: atrv_mini()
-
   # Index 11 points straight ahead, and indices grow clockwise (public sample configuration).
   defp ring_pose(steps, radius) do
     angle = steps * :math.pi() / 8

@@ -28,8 +28,9 @@ defmodule Missions.Patrol do
   @day_ms 86_400_000
   @longest_step_ms 1_000
 
-  @enforce_keys [:me, :points, :plan, :period_ms, :by]
-  defstruct @enforce_keys ++
+  @kept [:me, :points, :plan, :period_ms, :by]
+  @enforce_keys @kept
+  defstruct @kept ++
               [
                 now_ms: nil,
                 seen: %{},
@@ -100,10 +101,8 @@ defmodule Missions.Patrol do
   end
 
   @impl Robot.Mission
-  def halted(mission) do
-    kept = [:me, :points, :plan, :period_ms, :by]
-    struct!(__MODULE__, mission |> Map.take(kept) |> Map.to_list())
-  end
+  def halted(mission),
+    do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])

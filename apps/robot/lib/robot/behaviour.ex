@@ -129,8 +129,21 @@ defmodule Robot.Behaviour do
   end
 
   @doc """
-  Whether these options change nothing, for `c:update/2`: a mission repeats its goal at each tick, and need not be
-  checked again. `keys` are the options that the behaviour keeps in its state.
+  Changes these options, for `c:update/2`, by the check of `c:new/1`. `keys` are the options that the behaviour keeps in its
+  state.
+  """
+  @spec change(module(), keyword(), state :: map(), keys :: [atom()]) :: t()
+  def change(module, options, state, keys) do
+    if same?(options, state, keys) do
+      {module, state}
+    else
+      {_, fresh} = module.new(state |> Map.take(keys) |> Map.to_list() |> Keyword.merge(options))
+      {module, Map.merge(state, Map.take(fresh, keys))}
+    end
+  end
+
+  @doc """
+  Whether these options change nothing: a mission repeats its goal at each tick, and need not be checked again.
 
       iex> state = %{near: 1.5, mode: :going}
       iex> for options <- [[near: 1.5], [near: 1.6], [mode: :going]],

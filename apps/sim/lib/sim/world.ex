@@ -244,9 +244,8 @@ defmodule Sim.World do
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
-  @doc "Everything upright that robot `id` can see."
-  @spec poles(t(), id()) :: [CameraFrustum.pole()]
-  def poles(%__MODULE__{} = world, id) do
+  # Everything upright that robot `id` can see.
+  defp poles(%__MODULE__{} = world, id) do
     robots = for other <- world.order, other != id, do: pole(world.robots[other])
     landmark_pole(world) ++ robots
   end

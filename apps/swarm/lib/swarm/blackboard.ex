@@ -136,6 +136,5 @@ defmodule Swarm.Blackboard do
 
   defp call(board, request), do: Nonblocking.call(board, request, "the blackboard of this node")
 
-  defp age(at_ms), do: max(now() - at_ms, 0)
-  defp now, do: System.monotonic_time(:millisecond)
+  defp age(at_ms), do: max(Hal.Clock.now_ms() - at_ms, 0)
 end

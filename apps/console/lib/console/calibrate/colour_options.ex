@@ -39,8 +39,7 @@ defmodule Console.Calibrate.ColourOptions do
        "how much more or less light is tolerated (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
       {"min-area", "PIXELS", &Parse.whole(&1, 1..1_000_000), "smaller blobs are ignored (20)"},
       {"metres", "METRES", &Parse.number(&1, 0.1, 20),
-       "the distance of the thing: gives the constant for the robot file"},
-      {"help", nil, nil, "this text"}
+       "the distance of the thing: gives the constant for the robot file"}
     ]
   end
 

@@ -28,8 +28,6 @@ defmodule Console.Chaos.Options do
   """
   @spec parse([String.t()]) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments) do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     with {:ok, pairs} <- Arguments.parse(arguments, table()), :ok <- one_of(pairs) do
       {:ok, Enum.reduce(pairs, %__MODULE__{}, &put/2)}
     end
@@ -71,8 +69,7 @@ defmodule Console.Chaos.Options do
        "to shrink each violation; 0 leaves the run as it is (40)"},
       {"jobs", "N", &Parse.whole(&1, 1..1024), "how many runs at once (one a processor)"},
       {"json", "FILE|-", &file/1, "write the report (- is standard output)"},
-      {"keep", "DIR", &folder/1, "write each shrunk failure as a scenario into this folder"},
-      {"help", nil, nil, "this text"}
+      {"keep", "DIR", &folder/1, "write each shrunk failure as a scenario into this folder"}
     ]
   end
 

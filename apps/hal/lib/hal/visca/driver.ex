@@ -127,21 +127,22 @@ defmodule Hal.Visca.Driver do
   def reach(state), do: Session.reach(state.head)
 
   @impl Hal.Ptz
-  def look(pan, tilt, state), do: outward(Session.look(state.head, pan, tilt, now()), state)
+  def look(pan, tilt, state),
+    do: outward(Session.look(state.head, pan, tilt, Hal.Clock.now_ms()), state)
 
   @impl Hal.Ptz
   def zoom(field_of_view, state),
-    do: outward(Session.zoom(state.head, field_of_view, now()), state)
+    do: outward(Session.zoom(state.head, field_of_view, Hal.Clock.now_ms()), state)
 
   @impl Hal.Ptz
   def handle_message({:visca_wake, wake}, %__MODULE__{wake: wake} = state),
-    do: carry_out(Session.tick(state.head, now()), state)
+    do: carry_out(Session.tick(state.head, Hal.Clock.now_ms()), state)
 
   def handle_message({:visca_wake, _old}, state), do: {:ok, [], state}
 
   def handle_message(message, %__MODULE__{} = state) do
     case Serial.handle(state.line, message) do
-      {:data, bytes} -> carry_out(Session.bytes(state.head, bytes, now()), state)
+      {:data, bytes} -> carry_out(Session.bytes(state.head, bytes, Hal.Clock.now_ms()), state)
       {:error, reason} -> {:error, reason, state}
       :unknown -> {:ok, [], state}
     end
@@ -157,7 +158,7 @@ defmodule Hal.Visca.Driver do
     {effects, head} =
       Session.open(
         Keyword.take(options, [:camera, :model, :lens, :poll_ms, :field_of_view]),
-        now()
+        Hal.Clock.now_ms()
       )
 
     case carry_out({effects, head}, %__MODULE__{line: line, head: head}) do
@@ -203,13 +204,16 @@ defmodule Hal.Visca.Driver do
 
       at_ms ->
         wake = make_ref()
-        timer = Process.send_after(self(), {:visca_wake, wake}, max(at_ms, now()), abs: true)
+
+        timer =
+          Process.send_after(self(), {:visca_wake, wake}, max(at_ms, Hal.Clock.now_ms()),
+            abs: true
+          )
+
         %{state | timer: timer, wake: wake}
     end
   end
 
   defp cancel(%{timer: nil}), do: :ok
   defp cancel(%{timer: timer}), do: Process.cancel_timer(timer)
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

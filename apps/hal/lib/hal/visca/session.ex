@@ -182,20 +182,6 @@ defmodule Hal.Visca.Session do
     |> Enum.min(fn -> nil end)
   end
 
-  @doc """
-  Counts since the opening: bytes that did not belong to a message, messages of other cameras, and
-  positions that were doubted.
-  """
-  @spec counts(t()) :: %{
-          garbage: non_neg_integer(),
-          others: non_neg_integer(),
-          doubts: non_neg_integer()
-        }
-  def counts(%__MODULE__{decoder: decoder, outliers: outliers}) do
-    doubts = if outliers, do: outliers.doubts, else: 0
-    decoder |> Map.take([:garbage, :others]) |> Map.put(:doubts, doubts)
-  end
-
   # Opening
 
   # Whatever repeats itself in the opening, it must not do so for ever and in silence.

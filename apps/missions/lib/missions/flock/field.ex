@@ -122,9 +122,8 @@ defmodule Missions.Flock.Field do
     {scale * dx, scale * dy}
   end
 
-  @doc "The norm of a distance, which is smooth at 0 where the distance itself is not."
-  @spec norm(float()) :: float()
-  def norm(distance), do: (:math.sqrt(1 + @e * distance * distance) - 1) / @e
+  # The norm of a distance, which is smooth at 0 where the distance itself is not.
+  defp norm(distance), do: (:math.sqrt(1 + @e * distance * distance) - 1) / @e
 
   defp s1(z), do: z / :math.sqrt(1 + z * z)
 

@@ -59,11 +59,10 @@ defmodule Missions.Flock.Members do
   def together?([], _far), do: true
   def together?([first | rest], far), do: spread([first], rest, far) == []
 
-  @doc "Those that do not hang together with the first."
-  @spec spread([Pose.point()], [Pose.point()], float()) :: [Pose.point()]
-  def spread([], rest, _far), do: rest
+  # Those that do not hang together with the first.
+  defp spread([], rest, _far), do: rest
 
-  def spread([point | more], rest, far) do
+  defp spread([point | more], rest, far) do
     {near, rest} = Enum.split_with(rest, &(Pose.distance(point, &1) <= far))
     spread(near ++ more, rest, far)
   end

@@ -85,9 +85,8 @@ defmodule Sim.Scenario.Expectation do
          [{[], "cannot be #{inspect(expectation)}: its end must come after its beginning"}]}
   end
 
-  @doc "All expectations, as forms of `Sim.Trial.Form`."
-  @spec forms() :: [Form.form()]
-  def forms do
+  # All expectations, as forms of `Sim.Trial.Form`.
+  defp forms do
     robot = {:check, &(is_atom(&1) and &1 not in [nil, true, false, :all]), "a robot of this run"}
 
     who =

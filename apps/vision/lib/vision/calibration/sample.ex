@@ -50,9 +50,8 @@ defmodule Vision.Calibration.Sample do
   defp inside?({:box, {x, y, w, h}}, width, height),
     do: x >= 0 and y >= 0 and w >= 1 and h >= 1 and x + w <= width and y + h <= height
 
-  @doc "A place as a person writes it."
-  @spec words(place()) :: String.t()
-  def words({kind, numbers}), do: "#{kind} #{numbers |> Tuple.to_list() |> Enum.join(",")}"
+  # A place as a person writes it.
+  defp words({kind, numbers}), do: "#{kind} #{numbers |> Tuple.to_list() |> Enum.join(",")}"
 
   @doc """
   The first and last pixels that a place covers; those of a point are limited to a picture of this

@@ -38,7 +38,7 @@ defmodule Sim.Fleet.Nodes.PortMapper do
     if not there?() and File.exists?(program) do
       # A daemon does not hold our terminal. It returns before it listens.
       System.cmd(program, ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
-      await(now() + @up_ms)
+      await(Hal.Clock.now_ms() + @up_ms)
       sh = System.find_executable("sh")
       options = [:exit_status, :hide, args: ["-c", @keeper, "keeper", program]]
       Port.open({:spawn_executable, sh}, options)
@@ -62,7 +62,7 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   end
 
   defp await(deadline) do
-    if not there?() and now() < deadline do
+    if not there?() and Hal.Clock.now_ms() < deadline do
       receive do
       after
         20 -> await(deadline)
@@ -85,6 +85,4 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   end
 
   defp erts, do: Path.join([:code.root_dir(), "erts-#{:erlang.system_info(:version)}", "bin"])
-
-  defp now, do: System.monotonic_time(:millisecond)
 end
