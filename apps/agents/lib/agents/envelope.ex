@@ -247,7 +247,7 @@ defmodule Agents.Envelope do
 
   defp put(other, _envelope) do
     raise ArgumentError,
-          "#{inspect(other)} is not an option of an envelope; allowed are #{inspect(@options)}"
+          "envelope: expected options among #{inspect(@options)}, got #{inspect(other)}"
   end
 
   defp checked!({:ok, envelope}), do: envelope

@@ -82,12 +82,15 @@ defmodule Agents.Responder do
            do:
              raise(
                ArgumentError,
-               "#{inspect(options[:topics])} are not topics: atoms or text are allowed"
+               "topics: expected atoms or text, got #{inspect(options[:topics])}"
              )
 
     unless responder?(options[:module]),
       do:
-        raise(ArgumentError, "module cannot be #{inspect(options[:module])}: an Agents.Responder")
+        raise(
+          ArgumentError,
+          "module: expected an Agents.Responder, got #{inspect(options[:module])}"
+        )
 
     via = Names.via(name, {:service, options[:service]})
     HardenedServer.start_link(__MODULE__, {name, options}, name: via)

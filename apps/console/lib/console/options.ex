@@ -59,7 +59,7 @@ defmodule Console.Options do
       iex> {options.robots, options.landmark}
       {[:mag1, :mag2, :min1], {-2.0, 1.0}}
       iex> Console.Options.parse(~w(--robots -3))
-      {:error, [~s(--robots cannot be "-3": a whole number from 1 to 1000 is allowed)]}
+      {:error, [~s(--robots: expected a whole number from 1 to 1000, got "-3")]}
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do

@@ -51,7 +51,7 @@ defmodule Hal.CommandOutput do
           refuse(unknown(option, parser[:strict]))
 
         {_options, _words, [{option, text} | _]} ->
-          refuse("#{option} cannot be #{text}")
+          refuse("#{option}: expected another value, got #{text}")
 
         {options, words, []} ->
           if options[:help], do: help(help), else: told(carry_out.(options, words))

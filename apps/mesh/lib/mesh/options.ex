@@ -216,6 +216,6 @@ defmodule Mesh.Options do
 
   defp begin(other) do
     {:error, [{[], text}]} = Options.Wording.refuse("{Module, options}", other)
-    {:error, "strategies #{text}"}
+    {:error, "strategies: #{text}"}
   end
 end

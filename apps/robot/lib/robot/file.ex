@@ -111,7 +111,7 @@ defmodule Robot.File do
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
       {:error, [
-        "mag1.exs:1: arm: cannot be :manaul: :manual or :auto is allowed; did you mean :manual?"]}
+        "mag1.exs:1: arm: expected :manual or :auto, got :manaul; did you mean :manual?"]}
   """
   @spec parse(String.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
   def parse(text, options \\ []) do

@@ -180,7 +180,7 @@ defmodule Robot.SupervisorTest do
     assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
              goal.({Robot.Behaviour.Goto, [1]})
 
-    assert {:error, "Robot.Behaviour.Follow: follow option target cannot be %Hal.Pose{" <> _} =
+    assert {:error, "Robot.Behaviour.Follow: follow option target: expected " <> _} =
              goal.({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: nil}})
 
     assert {:error, ":roll is not a goal" <> _} = goal.(:roll)

@@ -33,7 +33,7 @@ defmodule Sim.Floorplan do
       iex> Sim.Floorplan.size(map)
       {18.0, 18.0}
       iex> {:error, line} = Sim.Floorplan.open("mars", 6)
-      iex> line =~ "unknown map mars: hall, hospital, arena, "
+      iex> line =~ "map: expected hall, hospital, arena, "
       true
   """
   @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}

@@ -40,7 +40,7 @@ defmodule Sim.Radio do
   and greatest delay, `:cut` the pairs that cannot hear each other. Wrong options raise `ArgumentError`.
 
       iex> Sim.Radio.new(seed: 1, loss: 2.0)
-      ** (ArgumentError) radio option loss cannot be 2.0: a number from 0 to 1 is allowed
+      ** (ArgumentError) radio option loss: expected a number from 0 to 1, got 2.0
   """
   @spec new(keyword()) :: t()
   def new(options) do

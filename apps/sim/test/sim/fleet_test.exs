@@ -218,7 +218,7 @@ defmodule Sim.FleetTest do
         ] do
       options = %{robots: [:mag76], map: "hall", mission: mission, nodes: nodes?}
       assert {:error, line} = Fleet.start_link(options)
-      assert line =~ "mission cannot be" and line =~ word
+      assert line =~ "mission: expected" and line =~ word
     end
   end
 

@@ -50,7 +50,7 @@ defmodule Swarm.Replacement do
       with {:ok, module, code} <- Replacement.Code.read(source),
            do: {:ok, {module, options}, code}
     else
-      {:error, "options cannot be #{Wording.show(options)}: [key: value, …] is allowed"}
+      {:error, "options: expected [key: value, …], got #{Wording.show(options)}"}
     end
   end
 

@@ -83,8 +83,7 @@ defmodule Swarm.ReplacementTest do
     id = robot(:repl_off)
 
     assert order(fn -> Swarm.replace(id, StandMission) end) ==
-             {:error,
-              "repl_off: its mission cannot be replaced: its file does not say replace: true"}
+             {:error, "repl_off: its mission: expected its file does not say replace: true"}
 
     assert replaced(id) == nil
   end
@@ -170,13 +169,13 @@ defmodule Swarm.ReplacementTest do
              Swarm.replace(id, {StandMission, spacing: 1})
 
     assert {:error, "no robot :repl_nobody; " <> _} = Swarm.replace(:repl_nobody, StandMission)
-    assert {:error, "mission cannot be 7: " <> _} = Swarm.replace(id, 7)
-    assert {:error, "code cannot be 7: " <> _} = Swarm.replace(id, {:code, 7})
+    assert {:error, "mission: expected " <> _} = Swarm.replace(id, 7)
+    assert {:error, "code: expected " <> _} = Swarm.replace(id, {:code, 7})
 
     assert {:error, ":nothing has no file with its code here"} =
              Swarm.replace(id, {:code, :nothing})
 
-    assert {:error, "options cannot be 7: " <> _} = Swarm.replace(id, {:code, StandMission, 7})
+    assert {:error, "options: expected " <> _} = Swarm.replace(id, {:code, StandMission, 7})
 
     assert {:error, "none of these modules is a Robot.Mission"} =
              Swarm.replace(

@@ -147,10 +147,10 @@ defmodule Vision.BlobDetector do
       ])
 
     unless is_boolean(options[:ptz]),
-      do: raise(ArgumentError, "blob detector option :ptz must be true or false")
+      do: raise(ArgumentError, "blob detector option ptz: expected true or false")
 
     unless match?(%Colours{}, options[:colours]),
-      do: raise(ArgumentError, "blob detector option :colours must be a %Vision.Colours{}")
+      do: raise(ArgumentError, "blob detector option colours: expected a %Vision.Colours{}")
 
     case options[:sink] do
       {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) ->
@@ -159,7 +159,7 @@ defmodule Vision.BlobDetector do
       other ->
         raise(
           ArgumentError,
-          "blob detector option :sink must be {m, f, a}, not #{inspect(other)}"
+          "blob detector option sink: expected {m, f, a}, got #{inspect(other)}"
         )
     end
   end

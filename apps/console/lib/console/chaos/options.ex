@@ -22,7 +22,7 @@ defmodule Console.Chaos.Options do
       iex> {options.runs, options.seed, Console.Chaos.Options.numbers(options)}
       {20, 7, 1..20}
       iex> Console.Chaos.Options.parse(~w(--runs 0))
-      {:error, [~s(--runs cannot be "0": a whole number from 1 to 1000000 is allowed)]}
+      {:error, [~s(--runs: expected a whole number from 1 to 1000000, got "0")]}
       iex> Console.Chaos.Options.parse(~w(--run 3 --runs 20))
       {:error, ["--run and --runs exclude each other; give one of them"]}
   """

@@ -27,7 +27,7 @@ defmodule Console.Cli.Arguments do
       iex> Console.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
       {:error,
        [
-         ~s(--count cannot be "0": a whole number from 1 to 9 is allowed),
+         ~s(--count: expected a whole number from 1 to 9, got "0"),
          "unknown option --cuont; did you mean --count?"
        ]}
   """
@@ -138,12 +138,12 @@ defmodule Console.Cli.Arguments do
   The error for a text that is not what is allowed, in the words of `Hal.Options`.
 
       iex> Console.Cli.Arguments.refuse("--map", "hal", {"hall or arena", "; did you mean hall?"})
-      {:error, ~s(--map cannot be "hal": hall or arena is allowed; did you mean hall?)}
+      {:error, ~s(--map: expected hall or arena, got "hal"; did you mean hall?)}
   """
   @spec refuse(String.t(), String.t(), allowed()) :: {:error, String.t()}
   def refuse(name, text, {allowed, hint}) do
     {:error, [{[], words}]} = Wording.refuse(allowed, text)
-    {:error, "#{name} #{words}#{hint}"}
+    {:error, "#{name}: #{words}#{hint}"}
   end
 
   def refuse(name, text, allowed), do: refuse(name, text, {allowed, ""})

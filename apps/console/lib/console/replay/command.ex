@@ -29,7 +29,7 @@ defmodule Console.Replay.Command do
       iex> Console.Replay.Command.parse("stepp", ["mag1"], 25.0)
       {:error, ~s("stepp" is not known; did you mean step?)}
       iex> Console.Replay.Command.parse("goto 30", ["mag1"], 25.0)
-      {:error, ~s(goto cannot be "30": a number from 0 to 25.0 is allowed)}
+      {:error, ~s(goto: expected a number from 0 to 25.0, got "30")}
   """
   @spec parse(String.t(), [String.t()], float()) :: {:ok, t()} | {:error, line :: String.t()}
   def parse(line, names, last_s) do

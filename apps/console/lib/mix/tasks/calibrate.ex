@@ -33,9 +33,7 @@ defmodule Mix.Tasks.Calibrate do
         IO.puts(@moduledoc)
 
       [word | _rest] ->
-        refuse(
-          "#{inspect(word)} cannot be calibrated: odometry or colour#{Suggest.hint(word, @words)}"
-        )
+        refuse("expected odometry or colour, got #{inspect(word)}#{Suggest.hint(word, @words)}")
 
       [] ->
         refuse("mix calibrate needs a command: mix calibrate odometry or mix calibrate colour")

@@ -59,7 +59,7 @@ defmodule Hal.Camera.FFmpeg do
   Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Camera.FFmpeg.options(source: "testsrc", loop: 1)
-      {:error, "camera option loop cannot be 1: true or false is allowed"}
+      {:error, "camera option loop: expected true or false, got 1"}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}
   defdelegate options(options), to: Options, as: :check

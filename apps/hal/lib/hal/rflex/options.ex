@@ -86,7 +86,7 @@ defmodule Hal.RFlex.Options do
   Checks the options; the error is one line that says what is wrong.
 
       iex> Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [distance: -1])
-      {:error, "rflex option conversions.distance cannot be -1: a number from 0.001 to 1.0e7 units per metre is allowed"}
+      {:error, "rflex option conversions.distance: expected a number from 0.001 to 1.0e7 units per metre, got -1"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do

@@ -70,7 +70,7 @@ defmodule Hal.Visca.Driver do
   Describes an error in words.
 
       iex> Hal.Visca.Driver.explain({:model, 0x0411}, port: "/dev/ttyS2")
-      "/dev/ttyS2: a camera FCB-EX780 (0x0411) answers: EVI-D30, EVI-D70 or EVI-D100 is allowed; model: in the robot file overrides this"
+      "/dev/ttyS2: expected EVI-D30, EVI-D70 or EVI-D100, got a camera FCB-EX780 (0x0411); model: in the robot file overrides this"
   """
   @impl Hal.Ptz
   def explain(reason, options), do: "#{options[:port]}: #{words(reason, options)}"
@@ -88,7 +88,7 @@ defmodule Hal.Visca.Driver do
     do: "the camera refuses to say its model; model: in the robot file names it"
 
   defp words({:model, code}, _options) do
-    "a camera #{Model.words(code)} answers: #{allowed()} is allowed; model: in the robot file overrides this"
+    "expected #{allowed()}, got a camera #{Model.words(code)}; model: in the robot file overrides this"
   end
 
   defp words({:zoom, zoom, key}, _options) do

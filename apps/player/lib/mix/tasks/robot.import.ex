@@ -116,11 +116,13 @@ defmodule Mix.Tasks.Robot.Import do
 
   defp profile(other) do
     hint = Suggest.hint(other, ["magellan", "atrv_mini"])
-    {:error, "--profile cannot be #{other}: magellan or atrv_mini#{hint}"}
+    {:error, "--profile: expected magellan or atrv_mini, got #{other}#{hint}"}
   end
 
   defp version(version) when version in [nil, 1, 2], do: {:ok, version}
-  defp version(other), do: {:error, "--player cannot be #{other}: 1 for 1.x, 2 for later ones"}
+
+  defp version(other),
+    do: {:error, "--player: expected 1 for 1.x or 2 for later ones, got #{other}"}
 
   defp free(nil, _force), do: :ok
   defp free(_out, true), do: :ok

@@ -69,7 +69,7 @@ defmodule Robot.Behaviour.TrackBlob do
     }
 
     if options[:near] > options[:far],
-      do: raise(ArgumentError, "option near cannot be #{options[:near]}: at most far is allowed")
+      do: raise(ArgumentError, "option near: expected at most far, got #{options[:near]}")
 
     {__MODULE__, Enum.into(options, state)}
   end

@@ -79,7 +79,7 @@ defmodule Robot.Control.Controller do
 
       other ->
         raise ArgumentError,
-              "option profile cannot be #{inspect(other)}: a %Hal.Profile{} is allowed"
+              "option profile: expected a %Hal.Profile{}, got #{inspect(other)}"
     end
   end
 

@@ -297,7 +297,7 @@ defmodule Robot.Control.Pilot do
         {:error, :no_mission}
 
       not Keyword.keyword?(options) ->
-        {:error, "#{inspect(options, limit: 5)} are not options: [key: value] is allowed"}
+        {:error, "expected options [key: value], got #{inspect(options, limit: 5)}"}
 
       Mission.checks?(module) ->
         Journal.asking(module, data, fn -> Mission.check_options(module, options, nil) end)

@@ -109,6 +109,10 @@ defmodule Sim.Emulator.RFlexController do
 
   def feel(%RFlexController.State{} = core, _other, _at_ms), do: core
 
+  @doc "Holds the joystick there: its counts and the bits of its buttons."
+  @spec stick(t(), integer(), integer(), byte()) :: t()
+  def stick(%RFlexController.State{} = core, x, y, buttons), do: %{core | stick: {x, y, buttons}}
+
   defp home(%{options: %{home: nil}} = core, _at_ms), do: core
 
   defp home(%{options: %{home: {address, from, to}}} = core, at_ms) do

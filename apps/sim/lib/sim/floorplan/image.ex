@@ -25,7 +25,7 @@ defmodule Sim.Floorplan.Image do
 
   defp unknown(name) do
     {allowed, hint} = Maps.fault(name)
-    {:error, "unknown map #{name}: #{allowed} is allowed#{hint}"}
+    {:error, "map: expected #{String.trim_trailing(allowed, ",")}, got #{name}#{hint}"}
   end
 
   defp sized(name, [_, file, size]) do

@@ -36,8 +36,8 @@ defmodule Sim.Scenario.File do
       iex> scenario.expect
       [{:formed, [by_s: 60.0]}]
       iex> Sim.Scenario.File.parse("[robots: 1,\\n script: [{5, {:kil, :mag1}}]]", "a.exs")
-      {:error, ["a.exs:2: script.1: cannot be {:kil, :mag1}: an event is one of kill, move, remove_landmark, tell, " <>
-        "estop, reset, cut, join, loss, freeze, displace, blind, deaf; did you mean kill?"]}
+      {:error, ["a.exs:2: script.1: expected an event, one of kill, move, remove_landmark, tell, " <>
+        "estop, reset, cut, join, loss, freeze, displace, blind, deaf, got {:kil, :mag1}; did you mean kill?"]}
   """
   @spec parse(String.t(), name :: String.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
   def parse(text, name \\ "scenario") do

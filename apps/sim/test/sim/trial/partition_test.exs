@@ -86,7 +86,7 @@ defmodule Sim.Trial.PartitionTest do
           [{1, 2, [:mag1 | :mag2]}]
         ] do
       assert {:error, line} = Trial.new(%{cuts: cuts})
-      assert line =~ "cuts cannot be" and not (line =~ "\n")
+      assert line =~ "cuts: expected" and not (line =~ "\n")
     end
   end
 

@@ -53,7 +53,7 @@ defmodule Swarm.Replacement.Order do
       do: {:ok, content},
       else:
         {:error,
-         "#{name(order.mission)}: its code takes #{div(byte_size(content), 1024)} kB; #{div(@most_bytes, 1024)} kB are allowed"}
+         "#{name(order.mission)}: expected code of at most #{div(@most_bytes, 1024)} kB, got #{div(byte_size(content), 1024)} kB"}
   end
 
   @doc "The order of bytes whose signature was checked; `:error` for anything else."
