@@ -1,6 +1,6 @@
 defmodule Mesh do
   @moduledoc """
-  The mesh of a node: which other nodes there are, and how to reach them.
+  Connects a node to its mesh: which other nodes there are, and how to reach them.
 
   There are two planes. Datagrams carry data that is worthless unless it is new, and they alone
   decide which nodes are alive: after a cut the next one arrives at once. Erlang's distribution

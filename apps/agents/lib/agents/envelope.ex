@@ -1,7 +1,7 @@
 defmodule Agents.Envelope do
   @moduledoc """
-  A message between programs on robots, with its intention, sender and conversation. Pure, except
-  for the reference of a new conversation.
+  Carries a message between programs on robots, with its intention, sender and conversation. Pure, except for the
+  reference of a new conversation.
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
   service asks another, a mission assigns tasks, a topic publishes news. `check/1` checks whatever

@@ -1,6 +1,6 @@
 defmodule Agents.Mailbox do
   @moduledoc """
-  A bounded queue of unread envelopes, urgent ones first. Pure.
+  Queues unread envelopes, up to a limit, urgent ones first. Pure.
 
     * Urgent envelopes are taken first, and are never dropped to make room.
     * All others are taken in the order they came.

@@ -1,7 +1,7 @@
 defmodule Agents.Responder do
   @moduledoc """
-  A program on a robot that answers envelopes: a service that others find by its name. It is a
-  companion of the robot's pilot, so it starts and crashes with the robot.
+  Runs a program on a robot that answers envelopes: a service that others find by its name. It is a companion of the
+  robot's pilot, so it starts and crashes with the robot.
 
       defmodule Battery do
         @behaviour Agents.Responder

@@ -1,5 +1,5 @@
 defmodule Bench.Table do
-  @moduledoc "Measured runs as a table in Markdown. Pure."
+  @moduledoc "Formats measured runs as a table in Markdown. Pure."
   alias Console.Cli.Format
   alias Sim.Trial.Claims
 

@@ -1,6 +1,6 @@
 defmodule Console.Demo do
   @moduledoc """
-  The demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
+  Runs the demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
   alias Console.{Fleet, Options, Picture, Report, Tables}
   alias Console.Cli.{Format, Output, Progress}

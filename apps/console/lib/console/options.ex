@@ -1,7 +1,7 @@
 defmodule Console.Options do
   @moduledoc """
-  The options of `mix demo`, checked once when it starts. Pure. One table describes the options
-  and makes the help text.
+  Reads the options of `mix demo`, checked once when it starts. Pure. One table describes the options and makes the help
+  text.
   """
   alias Console.{Cli, Fleet}
   alias Console.Options.Page

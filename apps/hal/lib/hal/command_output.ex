@@ -1,6 +1,7 @@
 defmodule Hal.CommandOutput do
   @moduledoc """
-  The standard output of a command that people start, which may be lost: a disk is full, or nobody reads any more.
+  Guards the standard output of a command that people start, which may be lost: a disk is full, or nobody reads any
+  more.
 
   Erlang writes later, and tells nobody what became of it; only the next one that writes learns it. A command
   that prints once and ends would say that all went well.

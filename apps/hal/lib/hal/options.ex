@@ -1,7 +1,7 @@
 defmodule Hal.Options do
   @moduledoc """
-  The one checker of options: a table says what is allowed, and every error names the key, the
-  value and what is allowed, in the same words. Pure; creates no atoms.
+  Checks all options: a table says what is allowed, and every error names the key, what was expected and what came
+  instead, in the same words. Pure; creates no atoms.
 
   A table is a keyword list of types (`Hal.Options.Type`): `key: type`,
   `key: [type, required: true]` or `key: [type, default: value]`. An option whose default is `nil`

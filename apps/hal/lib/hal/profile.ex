@@ -1,7 +1,6 @@
 defmodule Hal.Profile do
   @moduledoc """
-  The body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in
-  `base_link`.
+  Describes the body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in `base_link`.
 
   Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.

@@ -1,7 +1,7 @@
 defmodule Hal.Serial do
   @moduledoc """
-  A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet
-  boundaries are left to the caller.
+  Opens a serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet boundaries are left to
+  the caller.
 
       {:ok, line} = Hal.Serial.open(port: "/dev/ttyS0", speed: 115_200, last_words: stop)
       :ok = Hal.Serial.write(line, bytes)

@@ -1,6 +1,6 @@
 defmodule Mesh.Options do
   @moduledoc """
-  The options of a node's mesh, checked once.
+  Checks the options of a node's mesh, once.
 
   | option | |
   |---|---|

@@ -1,8 +1,8 @@
 defmodule Mesh.Server do
   @moduledoc """
-  The process around `Mesh.Protocol`: it owns the sockets, keeps the time and carries out effects.
-  What others ask often is in a table that all processes can read (`Mesh.Table`). What it hears
-  goes to the consumer that it gets at its start (`Mesh.Consumer`).
+  Runs the process around `Mesh.Protocol`: owns the sockets, keeps the time and carries out effects. What others ask
+  often is in a table that all processes can read (`Mesh.Table`). What it hears goes to the consumer that it gets at its
+  start (`Mesh.Consumer`).
 
   It follows the cards and addresses of the machine, five times a second (`Mesh.Interface`). Sockets that cannot be
   opened are tried again with back-off; a robot without a network drives on, and says so (`Mesh.fault/0`).

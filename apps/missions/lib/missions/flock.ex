@@ -1,7 +1,7 @@
 defmodule Missions.Flock do
   @moduledoc """
-  The flock: robots that keep together at a spacing, and go along a course, without a leader and without places
-  (Olfati-Saber 2006). Pure; written with the interface of `Robot.Mission` alone.
+  Flocks: robots keep together at a spacing, and go along a course, without a leader and without places (Olfati-Saber
+  2006). Pure; written with the interface of `Robot.Mission` alone.
 
   Each tick a robot takes its acceleration from its neighbours, from the echoes of its sonars that no robot explains, and
   from the present point of the course (`Missions.Flock.Field`), makes its velocity of it (`.Motion`), and drives with that

@@ -1,7 +1,8 @@
 defmodule Missions.Patrol do
   @moduledoc """
-  The patrol: points that are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
-  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of `Robot.Mission` alone.
+  Patrols: points are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
+  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
+  `Robot.Mission` alone.
 
   A point is due when nobody has seen it for a quarter of the `period`; whoever is within 0.5 m of it sees it. Each robot
   tells the others once a second, and at once when that changes, at which point it is, and how long ago every point was

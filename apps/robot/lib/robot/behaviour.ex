@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour do
   @moduledoc """
-  A behaviour turns what a robot perceives into a wish, one tick (100 ms) at a time. It is pure:
-  no clock, no process, no random numbers; the time is `percept.at_ms`.
+  Turns what a robot perceives into a wish, one tick (100 ms) at a time. It is pure: no clock, no process, no random
+  numbers; the time is `percept.at_ms`.
 
   A running behaviour is a pair `{module, state}`, so that behaviours can hold, start and combine
   others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It runs until it reports an

@@ -1,6 +1,6 @@
 defmodule Robot.Board do
   @moduledoc """
-  The newest readings of one robot, which any process on its node can read without a message.
+  Holds the newest readings of one robot, which any process on its node can read without a message.
 
   One ETS table of entries `{key, value, at_ms}`. Readers give the greatest age that they accept.
   Each key has one writer, and `put/5` raises for any other:

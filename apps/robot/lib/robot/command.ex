@@ -1,8 +1,7 @@
 defmodule Robot.Command do
   @moduledoc """
-  Text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a
-  case-insensitive keyword and its arguments. Pure; parsing never creates atoms from its input and
-  does not raise.
+  Parses text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a case-insensitive
+  keyword and its arguments. Pure; parsing never creates atoms from its input and does not raise.
 
   | text | command |
   |---|---|

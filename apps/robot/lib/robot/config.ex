@@ -1,6 +1,6 @@
 defmodule Robot.Config do
   @moduledoc """
-  The options of one robot, checked once.
+  Holds the options of one robot, checked once.
 
     * `:id` - an atom, such as `:mag1`
     * `:profile` - its body, `%Hal.Profile{}`

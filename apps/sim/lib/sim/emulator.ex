@@ -1,8 +1,8 @@
 defmodule Sim.Emulator do
   @moduledoc """
-  An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what
-  the device commands, and the device gets what the body senses. At the other end, the symbolic
-  link, a driver finds it like a real device.
+  Runs an emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what the device
+  commands, and the device gets what the body senses. At the other end, the symbolic link, a driver finds it like a real
+  device.
 
   | option | meaning |
   |---|---|

@@ -1,7 +1,6 @@
 defmodule Sim.Radio do
   @moduledoc """
-  A radio that delays, loses and duplicates messages, and can be partitioned, all from a seed.
-  Pure.
+  Simulates a radio that delays, loses and duplicates messages, and can be partitioned, all from a seed. Pure.
 
   The fate of a message depends on its number alone, so the same sends give the same deliveries,
   in the order of their time and then of their number. Every copy has its own draw: one message to

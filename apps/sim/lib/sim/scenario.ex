@@ -1,7 +1,7 @@
 defmodule Sim.Scenario do
   @moduledoc """
-  A scenario as data: a world and its robots, a script of events, and what is expected of the run.
-  Pure. `Sim.Scenario.Runner` runs it in lockstep, `Sim.Scenario.File` reads and writes it as text.
+  Describes a scenario as data: a world and its robots, a script of events, and what is expected of the run. Pure.
+  `Sim.Scenario.Runner` runs it in lockstep, `Sim.Scenario.File` reads and writes it as text.
   """
   alias Hal.Options
   alias Hal.Options.{Suggest, Type}

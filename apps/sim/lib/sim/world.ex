@@ -1,6 +1,6 @@
 defmodule Sim.World do
   @moduledoc """
-  A world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
+  Models a world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
 
   `step/2` acts, moves and senses. Every sensor is fresh after every step: all sonars fire at once
   and do not disturb each other. A body is a disc of the profile's radius; it stops at contact and

@@ -1,6 +1,6 @@
 defmodule Swarm.Formation do
   @moduledoc """
-  The places of robots in a formation, relative to the leader. Pure; metres and radians.
+  Computes the places of robots in a formation, relative to the leader. Pure; metres and radians.
 
   A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not in
   the list. Slots have the leader's heading, except in a `:circle`, where all face its centre.

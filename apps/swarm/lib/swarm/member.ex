@@ -1,8 +1,8 @@
 defmodule Swarm.Member do
   @moduledoc """
-  One robot of a fleet as one pure function: the peers it hears, its mission, its controller and its
-  gate, composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and
-  `Swarm.Comms` run the same parts in the same order, so both do the same on the same input.
+  Runs one robot of a fleet as one pure function: the peers it hears, its mission, its controller and its gate,
+  composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and `Swarm.Comms` run the same
+  parts in the same order, so both do the same on the same input.
 
   | input | from |
   |---|---|

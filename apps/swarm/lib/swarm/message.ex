@@ -1,6 +1,6 @@
 defmodule Swarm.Message do
   @moduledoc """
-  A message between robots: its sender, its kind, and a body whose shape depends on the kind.
+  Carries a message between robots: its sender, its kind, and a body whose shape depends on the kind.
 
   Whatever comes from outside passes `check/1` once, at the receiver: a malformed message is an
   error with a reason, to be dropped and counted, and nothing behind the receiver needs to check a

@@ -1,7 +1,7 @@
 defmodule Swarm.Missions do
   @moduledoc """
-  The missions for groups that this node knows, by name. They live in apps above this
-  one, so the configuration lists them:
+  Lists the missions for groups that this node knows, by name. They live in apps above this one, so the configuration
+  lists them:
 
       config :swarm, missions: [landmark: Missions.Landmark, patrol: Missions.Patrol]
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Status do
   @moduledoc """
-  A robot's status, for people. In `iex` it prints as one line:
+  Describes a robot's status, for people. In `iex` it prints as one line:
 
       #mag1 follow (1.20, -0.35, 90 deg) ±0.12 m, 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 

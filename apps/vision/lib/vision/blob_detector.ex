@@ -1,7 +1,7 @@
 defmodule Vision.BlobDetector do
   @moduledoc """
-  The process that finds blobs in frames. It works on the newest frame only: it drops older ones
-  that wait in its mailbox, so it does not lag behind its camera.
+  Finds blobs in frames, in a process of its own. It works on the newest frame only: it drops older ones that wait in
+  its mailbox, so it does not lag behind its camera.
 
   Options:
 

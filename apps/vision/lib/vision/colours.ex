@@ -1,6 +1,6 @@
 defmodule Vision.Colours do
   @moduledoc """
-  The colours to look for: up to 32 classes, each a box in YUV, read from a CMVision colour file.
+  Holds the colours to look for: up to 32 classes, each a box in YUV, read from a CMVision colour file.
 
       [Colors]
       (255,255,0) 0.500000 10 YellowLandmark

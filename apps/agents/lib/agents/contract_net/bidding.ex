@@ -1,8 +1,8 @@
 defmodule Agents.ContractNet.Bidding do
   @moduledoc """
-  The service of a robot that bids for tasks and carries them out: an `Agents.Responder` whose
-  argument is `{module, argument}`, the module a `Agents.ContractNet`. The work runs in a process
-  of its own, so that the robot keeps answering; cancelling a task ends it.
+  Serves a robot that bids for tasks and carries them out: an `Agents.Responder` whose argument is `{module, argument}`,
+  the module a `Agents.ContractNet`. The work runs in a process of its own, so that the robot keeps answering;
+  cancelling a task ends it.
   """
   alias Agents.ContractNet.Bidder
   alias Agents.{Conversation, Envelope}

@@ -1,7 +1,7 @@
 defmodule Console.Calibrate.Colour do
   @moduledoc """
-  `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their
-  effect in that picture, and writes the colour file.
+  Runs `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their effect in that
+  picture, and writes the colour file.
   """
   alias Console.Calibrate.{ColourOptions, Frames, StdinPrompt}
   alias Console.Cli.{Diff, Format, OutFile}

@@ -1,5 +1,5 @@
 defmodule Console.Chaos.Options do
-  @moduledoc "The options of `mix chaos`. Pure. One table describes them and makes the help text."
+  @moduledoc "Reads the options of `mix chaos`. Pure. One table describes them and makes the help text."
   alias Console.Cli.{Arguments, Parse}
 
   @most_runs 1_000_000

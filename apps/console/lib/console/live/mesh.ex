@@ -1,6 +1,6 @@
 defmodule Console.Live.Mesh do
   @moduledoc """
-  The robots of the mesh that this node is part of, whoever started them: what `bin/console` shows on its page.
+  Shows the robots of the mesh that this node is part of, whoever started them: what `bin/console` shows on its page.
 
   It asks four times a second for their status, and commands them, by `Swarm` alone, as a person does in a shell. No robot
   knows it: whether it hangs or dies changes nothing for them. Robots that come are shown by themselves, robots that have

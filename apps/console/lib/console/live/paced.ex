@@ -1,7 +1,7 @@
 defmodule Console.Live.Paced do
   @moduledoc """
-  A live fleet with the functions of `Sim.Trial`, so that a run without a view uses the same code:
-  one step waits a tenth of a second.
+  Runs a live fleet by the functions of `Sim.Trial`, so that a run without a view uses the same code: one step waits a
+  tenth of a second.
   """
   alias Sim.Fleet
 

@@ -1,7 +1,7 @@
 defmodule Console.Live.Trial do
   @moduledoc """
-  A trial that a person watches: the lockstep run, at the pace that the person wants
-  (`Console.Live.Pace`), at first one step of 100 ms each 100 ms.
+  Runs a trial that a person watches: the lockstep run, at the pace that the person wants (`Console.Live.Pace`), at
+  first one step of 100 ms each 100 ms.
 
   It never runs faster to make up for lost time: on a machine too slow for its fleet the run is
   slow, and an answer may take as long as a step. Whatever the pace, the same commands at the same

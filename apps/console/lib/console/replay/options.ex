@@ -1,5 +1,5 @@
 defmodule Console.Replay.Options do
-  @moduledoc "The options of `mix replay`, checked once when it starts. Pure."
+  @moduledoc "Reads the options of `mix replay`, checked once when it starts. Pure."
   alias Console.Cli.{Arguments, Parse}
 
   defstruct file: nil,

@@ -1,7 +1,7 @@
 defmodule Console.Scenario.Options do
   @moduledoc """
-  The arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded
-  (`nil`: nowhere). Pure.
+  Reads the arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded (`nil`:
+  nowhere). Pure.
   """
   alias Console.Cli.{Arguments, Parse}
 

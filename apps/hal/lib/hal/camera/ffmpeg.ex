@@ -3,7 +3,7 @@ defmodule Hal.Camera.FFmpeg do
   alias Hal.Frame
 
   @moduledoc """
-  A camera that reads any source that ffmpeg can read: a V4L2 device, a stream, a video file, a
+  Reads any source that ffmpeg can read: a V4L2 device, a stream, a video file, a
   picture, a test picture (`Hal.Camera.Source`).
 
   Options:

@@ -1,6 +1,6 @@
 defmodule Hal.Camera.Options do
   @moduledoc """
-  The options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
+  Checks the options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
   """
   alias Hal.Camera.Source
   alias Hal.Options

@@ -1,7 +1,7 @@
 defmodule Hal.Camera.Source do
   @moduledoc """
-  The sources that a camera can read, and ffmpeg's arguments for them. Pure, except that `check/1`
-  looks at the file system.
+  Lists the sources that a camera can read, and ffmpeg's arguments for them. Pure, except that `check/1` looks at the
+  file system.
 
   | source | is |
   |---|---|

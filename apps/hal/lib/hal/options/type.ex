@@ -1,6 +1,6 @@
 defmodule Hal.Options.Type do
   @moduledoc """
-  The types of an option in a table of `Hal.Options`: what they accept and return. Pure.
+  Reads the values of options by their types in a table of `Hal.Options`: what these accept and return. Pure.
 
   | type | accepts | returns |
   |---|---|---|

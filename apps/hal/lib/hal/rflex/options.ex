@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Options do
   @moduledoc """
-  The options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that
-  follow from the body (`Hal.RFlex.Sensors.Layout`). Pure.
+  Checks the options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that follow from the
+  body (`Hal.RFlex.Sensors.Layout`). Pure.
   """
   alias Hal.{Options, Profile, Serial}
   alias Hal.Drive.SlewLimiter

@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Driver do
   @moduledoc """
-  The driver of the pan-tilt-zoom unit of a Sony EVI-D30, D31, D70 or D100 (`Hal.Visca.Model`) on a
-  serial line, run by `Hal.Device`.
+  Drives the pan-tilt-zoom unit of a Sony EVI-D30, D31, D70 or D100 (`Hal.Visca.Model`) on a serial line, run by
+  `Hal.Device`.
 
       {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
 

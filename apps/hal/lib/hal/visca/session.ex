@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Session do
   @moduledoc """
-  A Sony EVI-D30, D31, D70 or D100 on its line, as a function of bytes, requests and time: what to
-  write, and what the unit reports. Pure; `Hal.Visca.Driver` runs it.
+  Models a Sony EVI-D30, D31, D70 or D100 on its line, as a function of bytes, requests and time: what to write, and
+  what the unit reports. Pure; `Hal.Visca.Driver` runs it.
 
   **Opening**: number the cameras, clear, ask for the model (`Hal.Visca.Model`), ask whether it is
   on (if not: switch it on), ask for the position. A camera that was switched off and on reports it in a

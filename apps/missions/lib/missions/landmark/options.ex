@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Options do
   @moduledoc """
-  The options of the landmark mission, checked and completed. Pure.
+  Checks and completes the options of the landmark mission. Pure.
 
   | option | meaning | default |
   |---|---|---|

@@ -1,9 +1,8 @@
 defmodule Robot.Control.Executive do
   @moduledoc """
-  Ten times a second: takes a percept from the board, runs a tick of `Robot.Control.Controller`,
-  and sends its wish to the gate and the percept to the pilot. It only casts to other parts of the
-  robot, so none of them can block it; what takes long, such as vision, is a process of its own
-  that writes to the board.
+  Takes a percept from the board ten times a second, runs a tick of `Robot.Control.Controller`, and sends its wish to
+  the gate and the percept to the pilot. It only casts to other parts of the robot, so none of them can block it; what
+  takes long, such as vision, is a process of its own that writes to the board.
 
   A behaviour that hangs blocks the executive. `Robot.Safety.LivenessMonitor` detects that and
   kills it.

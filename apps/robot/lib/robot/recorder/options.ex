@@ -1,5 +1,5 @@
 defmodule Robot.Recorder.Options do
-  @moduledoc "The options that people give to `Robot.Recorder`: `record:` of a robot file."
+  @moduledoc "Lists the options that people give to `Robot.Recorder`: `record:` of a robot file."
   alias Hal.Options
 
   @table [

@@ -1,8 +1,7 @@
 defmodule Robot.Safety.Gate do
   @moduledoc """
-  The only process that drives the wheels. It receives wishes, and 20 times a second sends the
-  drive what `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for
-  whatever reason, it stops the robot.
+  Drives the wheels; no other process does. It receives wishes, and 20 times a second sends the drive what
+  `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for whatever reason, it stops the robot.
 
   If `Robot.Safety.Reflex` answers `:now`, for example after a touched bumper or a sonar reading
   while the robot moves, the gate does not wait for the next step.

@@ -1,7 +1,7 @@
 defmodule Sim.Device.Drive do
   @moduledoc """
-  The wheels, sonars and bumpers of a robot in a simulated world. Options: `world` (its name),
-  `robot`. Until the world is up, and after it has ended, the error is `{:error, :no_world}`.
+  Simulates the wheels, sonars and bumpers of a robot in a simulated world. Options: `world` (its name), `robot`. Until
+  the world is up, and after it has ended, the error is `{:error, :no_world}`.
   """
   @behaviour Hal.Drive
   alias Hal.Twist

@@ -1,5 +1,5 @@
 defmodule Sim.Device.Ptz do
-  @moduledoc "The pan-tilt unit of a robot in a simulated world. Options as for `Sim.Device.Drive`."
+  @moduledoc "Simulates the pan-tilt unit of a robot in a simulated world. Options as for `Sim.Device.Drive`."
   @behaviour Hal.Ptz
   alias Sim.World
 

@@ -1,8 +1,8 @@
 defmodule Sim.Emulator.Wire do
   @moduledoc """
-  One direction of an imperfect serial line: bytes are lost, duplicated, delayed, or have one bit
-  flipped; and the line can be unplugged. Pure: what happens to the n-th byte is a hash of the
-  seed, the direction and n (`Sim.Noise`), so the same bytes meet the same faults again.
+  Simulates one direction of an imperfect serial line: bytes are lost, duplicated, delayed, or have one bit flipped; and
+  the line can be unplugged. Pure: what happens to the n-th byte is a hash of the seed, the direction and n
+  (`Sim.Noise`), so the same bytes meet the same faults again.
 
   | option | allowed | default |
   |---|---|---|

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.Nodes do
   @moduledoc """
-  World and robots, each in a process of the operating system of its own (`Sim.Node`), on
-  loopback; this one, the launcher, starts them and listens to them.
+  Runs world and robots, each in a process of the operating system of its own (`Sim.Node`), on loopback; this one, the
+  launcher, starts them and listens to them.
 
   A robot whose process ends, whoever killed it, is dead. One that sends nothing, perhaps because
   it is frozen, is `:silent` until it sends again. When the world's process ends, it is started

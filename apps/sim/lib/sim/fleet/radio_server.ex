@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.RadioServer do
   @moduledoc """
-  Two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at
-  once, and one that loses and delays messages by `Sim.Radio`.
+  Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
+  that loses and delays messages by `Sim.Radio`.
   """
   use GenServer
   alias Robot.Names

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Event do
   @moduledoc """
-  The events of a run's script, as data. Pure. An entry of a script is `{at_s, event}`.
+  Describes the events of a run's script, as data. Pure. An entry of a script is `{at_s, event}`.
 
   | event | what happens |
   |---|---|

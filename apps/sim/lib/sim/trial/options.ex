@@ -1,5 +1,5 @@
 defmodule Sim.Trial.Options do
-  @moduledoc "The checked options of a run, with their defaults. Pure."
+  @moduledoc "Checks the options of a run, with their defaults. Pure."
   alias Hal.Options
   alias Hal.Options.Type
   alias Missions.Landmark

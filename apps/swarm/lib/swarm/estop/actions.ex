@@ -1,7 +1,7 @@
 defmodule Swarm.EStop.Actions do
   @moduledoc """
-  The actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of
-  the stop, and spreads it.
+  Carries out the actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of the stop,
+  and spreads it.
   """
   alias Hal.Device
   alias Robot.{Board, Names}

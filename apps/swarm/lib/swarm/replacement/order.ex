@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Order do
   @moduledoc """
-  The order that replaces a mission, as bytes, and its signature. Pure.
+  Encodes the order that replaces a mission, as bytes, with its signature. Pure.
 
   Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
   options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no

@@ -1,7 +1,7 @@
 defmodule Vision.Backend.Native do
   @moduledoc """
-  The blob finder in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal
-  masks to those of the row above, so that only runs and regions take memory.
+  Finds blobs in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal masks to those of the row
+  above, so that only runs and regions take memory.
 
   With a scratch it searches for up to a millisecond on the scheduler of its caller; a large or
   noisy frame is finished on a dirty scheduler. Without one it is a dirty scheduler's from the

@@ -1,6 +1,6 @@
 defmodule Vision.Calibration.Sample do
   @moduledoc """
-  Places in a picture, and their pixels. Pure.
+  Takes the pixels of places in a picture. Pure.
 
   A place is `{:point, {x, y}}`, which stands for the 5 by 5 pixels around it, or
   `{:box, {x, y, width, height}}`; pixels count from the top left.

@@ -1,5 +1,5 @@
 defmodule Vision.Saver.Options do
-  @moduledoc "The options that people give to `Vision.Saver`, where they are listed. Pure."
+  @moduledoc "Lists the options that people give to `Vision.Saver`, where they are explained. Pure."
   alias Hal.Options
 
   @table [

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Protocol.Command do
   @moduledoc """
-  All commands to the controller, as bytes to write to the line. Pure; raw units.
+  Encodes the commands to the controller as bytes to write to the line. Pure; raw units.
 
   Axis 0 moves, axis 1 turns. A speed is always two frames, one for each axis. Torques and the
   acceleration of axis 1 are the constants that public drivers send.

@@ -1,7 +1,6 @@
 defmodule Sim.Emulator.RFlexController.Options do
   @moduledoc """
-  The checked options of an emulated controller. Pure. All options have defaults, which depend on
-  the `:kind`.
+  Checks the options of an emulated controller. Pure. All options have defaults, which depend on the `:kind`.
 
   | option | allowed | meaning |
   |---|---|---|

@@ -1,6 +1,6 @@
 defmodule Sim.Emulator.ViscaCamera.Options do
   @moduledoc """
-  The checked options of an emulated camera. Pure.
+  Checks the options of an emulated camera. Pure.
 
   | option | allowed | default |
   |---|---|---|
