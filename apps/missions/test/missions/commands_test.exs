@@ -148,7 +148,7 @@ defmodule Swarm.CommandsTest do
     assert line(Swarm.ask(id, {:start, :landmark, [assign: :luck]})) =~
              ~r/assign: expected .*, got :luck/
 
-    assert line(Swarm.ask(id, {:start, "landmark", []})) =~ "not a command"
+    assert line(Swarm.ask(id, {:start, "landmark", []})) =~ "expected a command"
     assert {Missions.Landmark, _} = state(id)
   end
 
