@@ -83,7 +83,8 @@ defmodule Swarm.ReplacementTest do
     id = robot(:repl_off)
 
     assert order(fn -> Swarm.replace(id, StandMission) end) ==
-             {:error, "repl_off: its mission: expected its file does not say replace: true"}
+             {:error,
+              "repl_off: its mission cannot be replaced: its file does not say replace: true"}
 
     assert replaced(id) == nil
   end

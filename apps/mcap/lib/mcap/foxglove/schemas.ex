@@ -139,10 +139,6 @@ defmodule Mcap.Foxglove.Schemas do
       file: :string,
       line: :integer
     ],
-    "foxglove.LaserScan" =>
-      stamp ++
-        [pose: pose, start_angle: :number, end_angle: :number] ++
-        [ranges: [:number], intensities: [:number]],
     "foxglove.Grid" =>
       stamp ++
         [pose: pose, column_count: :integer, cell_size: v2] ++

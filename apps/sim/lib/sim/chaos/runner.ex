@@ -56,8 +56,12 @@ defmodule Sim.Chaos.Runner do
     %{seed: seed, runs: runs, clean?: clean?(runs)}
   end
 
-  # No violation, but for false claims, of which `Sim.Chaos.Invariants.goal/0` allows some among many.
-  defp clean?(runs) do
+  @doc """
+  Whether runs are clean together: no violation, but for false claims, of which the goal of
+  `Sim.Chaos.Invariants.goal/0` allows some among many.
+  """
+  @spec clean?([played()]) :: boolean()
+  def clean?(runs) do
     {claims, true_claims} = claims(runs)
 
     true_claims >= Invariants.goal() * claims and

@@ -33,7 +33,7 @@ defmodule Swarm.Replacement.NodesTest do
     for node <- nodes, do: eventually(fn -> names -- ask(node, :find, []) == [] end)
     assert order(fn -> ask(base, :start, [StandMission, []]) end) == :ok
 
-    refused = "#{shut.name}: its mission: expected its file does not say replace: true"
+    refused = "#{shut.name}: its mission cannot be replaced: its file does not say replace: true"
 
     assert order(fn -> ask(base, :replace, [:all, {:code, good, [speed: 0.3]}]) end) ==
              {:error, refused}
