@@ -13,6 +13,7 @@ defmodule Mix.Tasks.Demo do
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
   alias Console.Terminal.Session
+  alias Sim.Fleet
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
   @robots_a_processor 20
@@ -54,7 +55,7 @@ defmodule Mix.Tasks.Demo do
 
     cond do
       options.headless and Options.real_time?(options) ->
-        recorded(options, &Demo.run(&1, Live.Paced, paced()))
+        recorded(options, &Demo.run(&1, Fleet, paced()))
 
       options.headless ->
         Sim.Trial.Memory.prepare(length(options.robots))
@@ -66,7 +67,7 @@ defmodule Mix.Tasks.Demo do
   end
 
   defp paced,
-    do: [lines: &Live.Paced.lines/1, ended: &Live.Paced.ended/1, stop: &Live.Paced.stop/1]
+    do: [lines: &Fleet.lines/1, ended: &Fleet.ended/1, stop: &Fleet.stop/1]
 
   defp lockstep(%{record: nil} = options, pace),
     do: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1, pace))

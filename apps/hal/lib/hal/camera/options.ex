@@ -36,7 +36,7 @@ defmodule Hal.Camera.Options do
       {:error, "camera option norm: expected :pal, :ntsc or :secam, got :palm; did you mean :pal?"}
       iex> Hal.Camera.Options.check(source: "a.mp4", norm: :pal)
       {:error, ~s(camera option norm is for a V4L2 device such as /dev/video0, not for "a.mp4")}
-      iex> Hal.Camera.Options.check(source: "gopher://camera/1") |> elem(1) |> String.slice(0, 68)
+      iex> Hal.Camera.Options.check(source: "gopher://camera/1") |> elem(1) |> String.slice(0, 42)
       "camera option source: expected a stream by"
   """
   @spec check(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}

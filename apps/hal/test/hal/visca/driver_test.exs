@@ -134,7 +134,7 @@ defmodule Hal.Visca.DriverTest do
           {{:model, nil}, "refuses to say its model"},
           {{:address, 2}, "camera 2 answers, and camera 1 does not"},
           {{:zoom, 0x2000, :d30}, "its zoom is 0x2000, and that of an EVI-D30 ends at 0x03FF"},
-          {{:position, 1200, 0, :d30}, "pan 1200, tilt 0, where an EVI-D30: expected"},
+          {{:position, 1200, 0, :d30}, "pan 1200, tilt 0, where an EVI-D30 cannot be"},
           {{:opening, :switch_on, "not now"}, "answers, but does not switch on (not now)"},
           {:no_answer, "no camera answers"},
           {:enoent, "/dev/ttyS2: no such device"}
