@@ -1,6 +1,7 @@
 defmodule Agents do
   @moduledoc """
-  Messages between programs on robots: questions and answers, topics, auctions, in the manner of FIPA's agents.
+  Exchanges messages between programs on robots: questions and answers, topics, auctions, in the manner of FIPA's
+  agents.
 
   A robot offers a service (`Agents.Responder`), others ask it (`Agents.Conversation`), subscribe to what it tells
   (`Agents.Topic`), or auction a task among many (`Agents.ContractNet`). None of it drives a robot: stops and limits are not theirs.

@@ -1,6 +1,6 @@
 defmodule Bench do
   @moduledoc """
-  The cases in which the landmark mission is measured, as one table. Pure.
+  Lists the cases in which the landmark mission is measured, as one table. Pure.
 
   A case is a run's options and what is done to the fleet once it has been in formation for 2 s:
   `:move` pushes the landmark 3 m, `:kill_leader` and `:kill_middle` kill a robot. The time of such

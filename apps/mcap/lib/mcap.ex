@@ -1,6 +1,7 @@
 defmodule Mcap do
   @moduledoc """
-  MCAP, version 0: a file of messages with time stamps that Foxglove, Lichtblick and Python's `mcap` open.
+  Reads and writes MCAP, version 0: a file of messages with time stamps that Foxglove, Lichtblick and Python's `mcap`
+  open.
 
   | module | for |
   |---|---|

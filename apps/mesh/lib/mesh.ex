@@ -1,6 +1,6 @@
 defmodule Mesh do
   @moduledoc """
-  The mesh of a node: which other nodes there are, and how to reach them.
+  Connects a node to its mesh: which other nodes there are, and how to reach them.
 
   There are two planes. Datagrams carry data that is worthless unless it is new, and they alone
   decide which nodes are alive: after a cut the next one arrives at once. Erlang's distribution
@@ -88,7 +88,7 @@ defmodule Mesh do
 
   @doc "The robots of other nodes that were heard within the last 2 s, and their nodes."
   @spec robots() :: %{atom() => node()}
-  def robots, do: Map.new(Table.robots(now() - @gone_ms + 1))
+  def robots, do: Map.new(Table.robots(Hal.Clock.now_ms() - @gone_ms + 1))
 
   @doc "Whether a robot of another node was heard within the last 2 s."
   @spec heard?(atom()) :: boolean()
@@ -105,12 +105,12 @@ defmodule Mesh do
   @spec beat(atom()) :: {integer(), non_neg_integer(), age_ms :: non_neg_integer()} | nil
   def beat(robot) do
     with {_node, boot, sequence, at_ms} <- Table.robot(robot),
-         do: {boot, sequence, now() - at_ms}
+         do: {boot, sequence, Hal.Clock.now_ms() - at_ms}
   end
 
   @doc "The other nodes that this node hears now."
   @spec alive() :: [node()]
-  def alive, do: Table.nodes(NodeTable.alive_since(now()))
+  def alive, do: Table.nodes(NodeTable.alive_since(Hal.Clock.now_ms()))
 
   @doc """
   All nodes as seen from this node. It copies everything that is known, so it is for people and
@@ -118,7 +118,7 @@ defmodule Mesh do
   """
   @spec view() :: view()
   def view do
-    now_ms = now()
+    now_ms = Hal.Clock.now_ms()
     connected = Node.list()
     held = Enum.group_by(robots(), &elem(&1, 1), &elem(&1, 0))
 
@@ -180,7 +180,7 @@ defmodule Mesh do
   @spec silent?(node()) :: boolean()
   def silent?(node) do
     heard_ms = Table.heard_ms(node)
-    heard_ms != nil and NodeTable.status(heard_ms, now()) != :alive
+    heard_ms != nil and NodeTable.status(heard_ms, Hal.Clock.now_ms()) != :alive
   end
 
   @doc """
@@ -194,7 +194,13 @@ defmodule Mesh do
         {:error, :unknown}
 
       {node, _boot, _sequence, _at_ms} ->
-        ways = Routing.ways(node(), Node.list(), Table.onward(NodeTable.alive_since(now())))
+        ways =
+          Routing.ways(
+            node(),
+            Node.list(),
+            Table.onward(NodeTable.alive_since(Hal.Clock.now_ms()))
+          )
+
         CommandRelay.send(node, ways, robot, request, ref)
     end
   end
@@ -204,6 +210,4 @@ defmodule Mesh do
     with pid when pid != nil <- Table.value(:server, nil), do: GenServer.cast(pid, request)
     :ok
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,6 +1,6 @@
 defmodule Robot do
   @moduledoc """
-  One robot: what it perceives, wishes and may do, ten times a second.
+  Runs one robot: what it perceives, wishes and may do, ten times a second.
 
   A tick is a function (`Robot.Control.Controller`): from a percept (`Robot.Percept`) behaviours make wishes
   (`Robot.Behaviour`), the arbiter chooses one, and the gate has the last word (`Robot.Safety.Reflex`). What a robot does over

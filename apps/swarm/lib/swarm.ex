@@ -72,14 +72,8 @@ defmodule Swarm do
   end
 
   @doc """
-  Starts the group's mission: that of each robot's file, else the first that is configured, which finds the landmark,
-  elects who leads, and follows in formation. Options: `robots` (who takes part, default `:all`), and those of the
-  landmark mission: `formation` (`:wedge` or `{:wedge, 1.2}`), `assign` (`:chain` or `:cost`), `leader_change`
-  (whether another robot may take over), `policy`
-  (`:available`, the default: each part of a divided fleet leads itself, or `:majority`: only more
-  than half of the fleet, whose size is the number of `robots` unless `of` says another),
-  `lost_link` (`:stop`, `:hold` or `:continue`: what a robot does when it no longer hears anybody;
-  `Missions.Landmark.Policy`).
+  Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots` (who takes
+  part, default `:all`), and those of the mission (`Swarm.Missions`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])

@@ -1,6 +1,6 @@
 defmodule Vm do
   @moduledoc """
-  Further Erlang VMs with the code of this build: for tests, for benchmarks, and for fleets whose robots are
+  Starts further Erlang VMs with the code of this build: for tests, for benchmarks, and for fleets whose robots are
   processes of their own. No release of a robot has this.
 
       [one, two] = Vm.start([[name: :one], [name: :two]])

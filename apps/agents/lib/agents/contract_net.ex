@@ -72,7 +72,7 @@ defmodule Agents.ContractNet do
 
     outcome =
       task
-      |> Manager.start(Map.keys(found), options, now(), letter.conversation)
+      |> Manager.start(Map.keys(found), options, Hal.Clock.now_ms(), letter.conversation)
       |> send_all(found, letter)
       |> run(found, refs, letter)
 
@@ -96,14 +96,17 @@ defmodule Agents.ContractNet do
       receive do
         %Envelope{in_reply_to: ref} = envelope when is_map_key(refs, ref) ->
           case Envelope.check(envelope) do
-            {:ok, e} -> Manager.hear(manager, refs[ref], e.performative, e.content, now())
-            {:error, _field} -> {manager, []}
+            {:ok, e} ->
+              Manager.hear(manager, refs[ref], e.performative, e.content, Hal.Clock.now_ms())
+
+            {:error, _field} ->
+              {manager, []}
           end
 
         {RemoteMonitor, ref, :gone} when is_map_key(refs, ref) ->
-          Manager.gone(manager, refs[ref], now())
+          Manager.gone(manager, refs[ref], Hal.Clock.now_ms())
       after
-        max(manager.due_ms - now(), 0) -> Manager.tick(manager, now())
+        max(manager.due_ms - Hal.Clock.now_ms(), 0) -> Manager.tick(manager, Hal.Clock.now_ms())
       end
 
     step |> send_all(found, letter) |> run(found, refs, letter)
@@ -120,7 +123,7 @@ defmodule Agents.ContractNet do
     case Conversation.post(pid, letter) do
       # The letters that follow from it are sent after those that were decided before.
       {:error, :not_connected} ->
-        {manager, letters} = Manager.gone(manager, peer, now())
+        {manager, letters} = Manager.gone(manager, peer, Hal.Clock.now_ms())
         send_all({manager, rest ++ letters}, found, letter)
 
       _sent_or_busy ->
@@ -142,6 +145,4 @@ defmodule Agents.ContractNet do
       0 -> :ok
     end
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

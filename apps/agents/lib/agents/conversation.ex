@@ -103,7 +103,7 @@ defmodule Agents.Conversation do
 
   defp enough(other, _count) do
     raise ArgumentError,
-          "quorum cannot be #{brief(other)}: :all, :majority, or a whole number from 0"
+          "quorum: expected :all, :majority, or a whole number from 0, got #{brief(other)}"
   end
 
   @doc false
@@ -112,7 +112,7 @@ defmodule Agents.Conversation do
   def patience!(ms) do
     if Wire.ms?(ms),
       do: :ok,
-      else: raise(ArgumentError, "the timeout cannot be #{brief(ms)}: whole ms, up to a day")
+      else: raise(ArgumentError, "timeout: expected whole ms, up to a day, got #{brief(ms)}")
   end
 
   @doc false

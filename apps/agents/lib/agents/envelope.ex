@@ -1,7 +1,7 @@
 defmodule Agents.Envelope do
   @moduledoc """
-  A message between programs on robots, with its intention, sender and conversation. Pure, except
-  for the reference of a new conversation.
+  Carries a message between programs on robots, with its intention, sender and conversation. Pure, except for the
+  reference of a new conversation.
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
   service asks another, a mission assigns tasks, a topic publishes news. `check/1` checks whatever
@@ -247,7 +247,7 @@ defmodule Agents.Envelope do
 
   defp put(other, _envelope) do
     raise ArgumentError,
-          "#{inspect(other)} is not an option of an envelope; allowed are #{inspect(@options)}"
+          "envelope: expected options among #{inspect(@options)}, got #{inspect(other)}"
   end
 
   defp checked!({:ok, envelope}), do: envelope

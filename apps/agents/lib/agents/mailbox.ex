@@ -1,6 +1,6 @@
 defmodule Agents.Mailbox do
   @moduledoc """
-  A bounded queue of unread envelopes, urgent ones first. Pure.
+  Queues unread envelopes, up to a limit, urgent ones first. Pure.
 
     * Urgent envelopes are taken first, and are never dropped to make room.
     * All others are taken in the order they came.
@@ -46,13 +46,13 @@ defmodule Agents.Mailbox do
   Checks the limit of a mailbox.
 
       iex> Agents.Mailbox.limit(0)
-      {:error, "limit cannot be 0: a whole number above 0"}
+      {:error, "limit: expected a whole number above 0, got 0"}
   """
   @spec limit(term()) :: {:ok, pos_integer()} | {:error, line :: String.t()}
   def limit(limit) when is_integer(limit) and limit > 0, do: {:ok, limit}
 
   def limit(other),
-    do: {:error, "limit cannot be #{inspect(other, limit: 5)}: a whole number above 0"}
+    do: {:error, "limit: expected a whole number above 0, got #{inspect(other, limit: 5)}"}
 
   @doc "How many envelopes wait."
   @spec size(t()) :: non_neg_integer()

@@ -1,8 +1,7 @@
 defmodule Agents.PubSub do
   @moduledoc """
-  Events between the processes of one node, by either of two adapters: `Agents.PubSub.Local`,
-  which is always available, or `Agents.PubSub.Phoenix`, where `phoenix_pubsub` is installed.
-  `Agents.Topic` publishes between robots.
+  Publishes events to the processes of one node, by either of two adapters: `Agents.PubSub.Local`, which is always
+  available, or `Agents.PubSub.Phoenix`, where `phoenix_pubsub` is installed. `Agents.Topic` publishes between robots.
 
       children = [{Agents.PubSub.Local, name: Hall.Events}]
       bus = {Agents.PubSub.Local, Hall.Events}

@@ -1,7 +1,7 @@
 defmodule Agents.Responder do
   @moduledoc """
-  A program on a robot that answers envelopes: a service that others find by its name. It is a
-  companion of the robot's pilot, so it starts and crashes with the robot.
+  Runs a program on a robot that answers envelopes: a service that others find by its name. It is a companion of the
+  robot's pilot, so it starts and crashes with the robot.
 
       defmodule Battery do
         @behaviour Agents.Responder
@@ -24,7 +24,7 @@ defmodule Agents.Responder do
   `:failure`, the event `[:swarm, :responder, :failure]` reports it, and the state is kept:
   otherwise four bad envelopes within five seconds would end the robot.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Robot.Names
   alias Agents.{Conversation, Envelope, Inbox}
@@ -82,12 +82,15 @@ defmodule Agents.Responder do
            do:
              raise(
                ArgumentError,
-               "#{inspect(options[:topics])} are not topics: atoms or text are allowed"
+               "topics: expected atoms or text, got #{inspect(options[:topics])}"
              )
 
     unless responder?(options[:module]),
       do:
-        raise(ArgumentError, "module cannot be #{inspect(options[:module])}: an Agents.Responder")
+        raise(
+          ArgumentError,
+          "module: expected an Agents.Responder, got #{inspect(options[:module])}"
+        )
 
     via = Names.via(name, {:service, options[:service]})
     HardenedServer.start_link(__MODULE__, {name, options}, name: via)
@@ -123,10 +126,6 @@ defmodule Agents.Responder do
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Inbox.counts(s.inbox), s}
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(message, s) do

@@ -1,6 +1,6 @@
 defmodule Agents.Template do
   @moduledoc """
-  A filter for envelopes, as data. Pure.
+  Filters envelopes by a description that is data. Pure.
 
       [performative: :inform, from: :mag1]                  all of these fields
       [performative: [:agree, :refuse]]                     a list: one of these

@@ -1,6 +1,6 @@
 defmodule Agents.Topic do
   @moduledoc """
-  Publish and subscribe on all connected nodes.
+  Publishes to subscribers on all connected nodes.
 
       {:ok, poses} = Agents.Topic.subscribe(:poses, template: [from: :mag1], limit: 20)
       Agents.Topic.publish(:poses, :mag1, {1.0, 2.0}, class: :telemetry)

@@ -119,7 +119,7 @@ defmodule Agents.MailboxTest do
       assert_raise ArgumentError, ~r/:speed/, fn -> Inbox.new(template: [speed: 1]) end
       assert_raise ArgumentError, fn -> Inbox.new(size: 1) end
 
-      assert_raise ArgumentError, "limit cannot be 0: a whole number above 0", fn ->
+      assert_raise ArgumentError, "limit: expected a whole number above 0, got 0", fn ->
         Inbox.new(limit: 0)
       end
     end

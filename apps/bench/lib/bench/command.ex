@@ -1,6 +1,6 @@
 defmodule Bench.Command do
   @moduledoc "Runs a command `mix bench NAME`: reads its options by its table, or prints its help."
-  alias Console.Cli.{Arguments, MapName}
+  alias Console.Cli.{Arguments, MapName, Output, Progress}
 
   @doc "Measures with the options given, by their names; each error is one line. `more` ends the help."
   @spec run([String.t()], String.t(), [Arguments.option()], (map() -> result), more :: String.t()) ::
@@ -13,6 +13,56 @@ defmodule Bench.Command do
       if given["help"],
         do: IO.puts("  mix bench #{name} [options]\n\n#{Arguments.help(table)}#{more}"),
         else: measure.(given)
+    end
+  end
+
+  @doc """
+  Measures jobs, two at a time, and shows how far it is; `named` is a job in words. The results stand beside their jobs, in
+  their order.
+  """
+  @spec each([job], (job -> result), (job -> String.t())) :: [{job, result}]
+        when job: term(), result: term()
+  def each(jobs, measure, named) do
+    output = Output.to(:stderr)
+
+    results =
+      jobs
+      |> Task.async_stream(&alone(&1, measure), max_concurrency: 2, timeout: :infinity)
+      |> Enum.with_index(1)
+      |> Enum.map(fn {{:ok, {job, _} = result}, done} ->
+        progress(output, done, length(jobs), named.(job))
+        result
+      end)
+
+    Output.finish(output)
+    results
+  end
+
+  defp alone(job, measure) do
+    Sim.Trial.Memory.prepare()
+    {job, measure.(job)}
+  end
+
+  @doc "Shows how far a bench is."
+  @spec progress(Output.t(), number(), number(), String.t()) :: :ok
+  def progress(output, done, all, note),
+    do: Output.progress(output, Progress.line(done, all, note, (output.columns || 80) - 1))
+
+  @doc "What the command answers when jobs have failed with these lines, or none has."
+  @spec failed([String.t()]) :: :ok | {:error, [String.t()]}
+  def failed([]), do: :ok
+  def failed(lines), do: {:error, lines}
+
+  @doc "Measures in a folder that is removed afterwards."
+  @spec in_folder(name :: String.t(), (Path.t() -> result)) :: result when result: term()
+  def in_folder(name, measure) do
+    folder = Path.join(System.tmp_dir!(), "convoy-#{name}-#{System.unique_integer([:positive])}")
+    File.mkdir_p!(folder)
+
+    try do
+      measure.(folder)
+    after
+      File.rm_rf!(folder)
     end
   end
 

@@ -1,7 +1,7 @@
 defmodule Bench.Explore do
   @moduledoc """
-  One exploration of a map that the robots do not know, and what of it they have seen at which time: `mix bench explore`. In
-  lockstep with default noise; all of it follows from map, number of robots and seed.
+  Measures one exploration of a map that the robots do not know, and what of it they have seen at which time: `mix bench
+  explore`. In lockstep with default noise; all of it follows from map, number of robots and seed.
 
   The area, and what of it is seen: `Sim.Trial.Coverage`.
   """

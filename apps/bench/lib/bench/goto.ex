@@ -153,8 +153,4 @@ defmodule Bench.Goto do
   @doc "Whether a robot that says that it is there truly is."
   @spec arrived?(measured()) :: boolean()
   def arrived?(measured), do: measured.ended == :done and measured.off_m <= @there_m
-
-  @doc "What the table says of its goal, metres."
-  @spec there_m() :: float()
-  def there_m, do: @there_m
 end

@@ -9,4 +9,9 @@ defmodule Bench.Load do
          do: load,
          else: (_unknown -> nil)
   end
+
+  @doc "The load before a bench, and that after it, in words: now, unless it is given."
+  @spec words(before :: float() | nil, later :: float() | nil) :: String.t()
+  def words(before, later \\ now()),
+    do: "Load of the machine (1 min): #{before || "?"} before, #{later || "?"} after"
 end

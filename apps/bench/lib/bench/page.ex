@@ -43,7 +43,7 @@ defmodule Bench.Page do
     with {:ok, fleet} <- Sim.Fleet.start_link(robots: robots, blobs: :direct),
          {:ok, page, url} <- Page.start_link(module: Live.Fleet, live: fleet, robots: robots) do
       note.("the fleet forms")
-      formed(fn -> Sim.Fleet.scene(fleet).formed? end, now() + @form_ms)
+      formed(fn -> Sim.Fleet.scene(fleet).formed? end, Hal.Clock.now_ms() + @form_ms)
       boards = Enum.map(robots, &Board.find!/1)
       turns = turns(vm, url, given, note, &steady(boards, &1))
       :ok = Supervisor.stop(page)
@@ -59,7 +59,7 @@ defmodule Bench.Page do
            Live.Trial.start_link(Sim.Trial, Console.Options.trial(options), Live.Pace.new(:max)),
          {:ok, page, url} <- Page.start_link(module: Live.Trial, live: live, robots: robots) do
       note.("the fleet forms in lockstep")
-      formed(fn -> Live.Trial.scene(live).formed? end, now() + @form_ms)
+      formed(fn -> Live.Trial.scene(live).formed? end, Hal.Clock.now_ms() + @form_ms)
       {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
       turns = turns(vm, url, given, note, &cost/1)
       :ok = Supervisor.stop(page)
@@ -87,7 +87,7 @@ defmodule Bench.Page do
 
   # Until then the work of the robots changes from turn to turn.
   defp formed(formed?, until_ms) do
-    unless formed?.() or now() > until_ms do
+    unless formed?.() or Hal.Clock.now_ms() > until_ms do
       wait(@begin_ms)
       formed(formed?, until_ms)
     end
@@ -95,21 +95,21 @@ defmodule Bench.Page do
 
   defp cost(ms) do
     {cpu_ms, _since} = :erlang.statistics(:runtime)
-    began_ms = now()
+    began_ms = Hal.Clock.now_ms()
     wait(ms)
     {then_ms, _since} = :erlang.statistics(:runtime)
-    %{cpu: 100 * (then_ms - cpu_ms) / (now() - began_ms)}
+    %{cpu: 100 * (then_ms - cpu_ms) / (Hal.Clock.now_ms() - began_ms)}
   end
 
   defp steady(boards, ms) do
-    {began_ms, ticks} = {now(), Enum.map(boards, &tick/1)}
+    {began_ms, ticks} = {Hal.Clock.now_ms(), Enum.map(boards, &tick/1)}
     gap_ms = gap(boards, began_ms + ms, 0)
     counts = Enum.zip_with(Enum.map(boards, &tick/1), ticks, &(&1 - &2))
-    %{hz: 1_000 * Enum.min(counts) / (now() - began_ms), gap_ms: gap_ms}
+    %{hz: 1_000 * Enum.min(counts) / (Hal.Clock.now_ms() - began_ms), gap_ms: gap_ms}
   end
 
   defp gap(boards, until_ms, most) do
-    if now() >= until_ms do
+    if Hal.Clock.now_ms() >= until_ms do
       most
     else
       wait(@sample_ms)
@@ -125,7 +125,6 @@ defmodule Bench.Page do
     do: with({:ok, _doing, at_ms} <- doing(board), do: apply(m, f, a) - at_ms)
 
   defp doing(board), do: Board.fetch(board, :doing, :infinity)
-  defp now, do: System.monotonic_time(:millisecond)
 
   @doc """
   The table in Markdown: medians of the turns, the longest of all gaps, and what is more than with nobody.

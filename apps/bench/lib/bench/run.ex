@@ -1,5 +1,5 @@
 defmodule Bench.Run do
-  @moduledoc "One run of a case: what is done to the fleet, and what is measured. No process."
+  @moduledoc "Runs a case once: what is done to the fleet, and what is measured. No process."
 
   alias Hal.Pose
 

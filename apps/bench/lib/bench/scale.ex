@@ -121,10 +121,7 @@ defmodule Bench.Scale do
         ]
       end
 
-    table =
-      Enum.map_join([@heads, Enum.map(@heads, fn _ -> "---" end) | rows], fn row ->
-        "| " <> Enum.join(row, " | ") <> " |\n"
-      end)
+    table = Bench.Table.markdown(@heads, rows)
 
     table <> "\n" <> Enum.map_join(all, &bar(&1, Enum.max(Enum.map(all, fn a -> a.cpu_us end))))
   end

@@ -1,5 +1,5 @@
 defmodule Bench.Table do
-  @moduledoc "Measured runs as a table in Markdown. Pure."
+  @moduledoc "Formats measured runs as a table in Markdown. Pure."
   alias Console.Cli.Format
   alias Sim.Trial.Claims
 
@@ -20,8 +20,12 @@ defmodule Bench.Table do
 
   @doc "The table of rows `{says, map, limit_s, measured}`."
   @spec draw([{String.t(), String.t(), number(), [Bench.Run.measured()]}]) :: String.t()
-  def draw(rows) do
-    lines = [@heads, Enum.map(@heads, fn _ -> "---" end)] ++ Enum.map(rows, &row/1)
+  def draw(rows), do: markdown(@heads, Enum.map(rows, &row/1))
+
+  @doc "Rows of texts under their heads, in Markdown."
+  @spec markdown([String.t()], [[String.t()]]) :: String.t()
+  def markdown(heads, rows) do
+    lines = [heads, Enum.map(heads, fn _ -> "---" end)] ++ rows
     Enum.map_join(lines, "\n", &("| " <> Enum.join(&1, " | ") <> " |")) <> "\n"
   end
 

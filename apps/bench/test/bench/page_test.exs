@@ -27,7 +27,7 @@ defmodule Bench.PageTest do
 
   test "wrong input is one line each" do
     assert {:error, [robots, slow]} = Bench.Page.Main.run(~w(--robots 0 --slow x))
-    assert robots =~ ~s(--robots cannot be "0": a whole number from 1 to 100)
-    assert slow =~ ~s(--slow cannot be "x")
+    assert robots =~ ~s(--robots: expected a whole number from 1 to 100)
+    assert slow =~ ~r/--slow: expected .*, got "x"/
   end
 end

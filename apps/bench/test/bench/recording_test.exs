@@ -15,7 +15,7 @@ defmodule Bench.RecordingTest do
 
   test "wrong input is one line each" do
     assert {:error, [robots, rounds]} = Recording.Main.run(~w(--robots 0,x --rounds 0))
-    assert robots =~ ~s(--robots cannot be "0,x": whole numbers from 1 to 100)
-    assert rounds =~ ~s(--rounds cannot be "0")
+    assert robots =~ ~s(--robots: expected whole numbers from 1 to 100)
+    assert rounds =~ ~r/--rounds: expected .*, got "0"/
   end
 end

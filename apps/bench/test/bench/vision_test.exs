@@ -134,7 +134,7 @@ defmodule Bench.VisionTest do
 
   test "what cannot be measured is told in one line" do
     for {words, said} <- [
-          {~w(--rounds 0), "--rounds cannot be"},
+          {~w(--rounds 0), "--rounds: expected"},
           {~w(--frames easy,hard), "names of easy, speckle, photograph"},
           {~w(--beside no/such/program), "the path of a program"},
           {~w(--round 3), "did you mean --rounds?"}

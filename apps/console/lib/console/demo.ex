@@ -1,6 +1,6 @@
 defmodule Console.Demo do
   @moduledoc """
-  The demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
+  Runs the demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
   alias Console.{Fleet, Options, Picture, Report, Tables}
   alias Console.Cli.{Format, Output, Progress}
@@ -14,7 +14,7 @@ defmodule Console.Demo do
   @progress_ms 100
 
   @doc """
-  Runs `options` with a trial module (`Sim.Trial`) and returns the exit status: 0 if the fleet
+  Runs `options` with `Sim.Trial`, or `Sim.Fleet` in real time, and returns the exit status: 0 if the fleet
   ended in formation, 2 if it did not, 1 if the run cannot be made, or ended before its time. Among
   the `hooks`, `lines` returns lines to print about the trial before it runs, `ended` says why it
   ended before its time (or `nil`), and `stop` ends what it leaves behind.
@@ -83,6 +83,10 @@ defmodule Console.Demo do
   end
 
   defp slow(_real_time, _trial), do: ""
+
+  defp begin(Sim.Fleet, options) do
+    with {:ok, fleet} <- Sim.Fleet.start_link(Options.trial(options)), do: {:ok, fleet, nil, nil}
+  end
 
   defp begin(module, %Options{record: nil, csv: nil} = options) do
     with {:ok, trial} <- module.new(Options.trial(options)), do: {:ok, trial, nil, nil}
@@ -169,12 +173,22 @@ defmodule Console.Demo do
       run
     else
       before = run.trial
-      trial = run.module.step(before)
+      trial = step(run.module, before)
       scene = run.module.scene(trial)
       {trial, run} = record(run, before, trial, scene)
       play(%{run | trial: trial, track: run.track && RunTrack.add(run.track, scene)}, scene)
     end
   end
+
+  # Robots in real time go by themselves.
+  defp step(Sim.Fleet, fleet) do
+    receive do
+    after
+      @progress_ms -> fleet
+    end
+  end
+
+  defp step(module, trial), do: module.step(trial)
 
   defp record(%{recorder: nil, tables: nil} = run, _before, trial, _scene), do: {trial, run}
 

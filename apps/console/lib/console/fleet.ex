@@ -1,6 +1,6 @@
 defmodule Console.Fleet do
   @moduledoc """
-  The robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
+  Names the robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
   """
 
   @most 1_000

@@ -1,6 +1,6 @@
 defmodule Console.Live do
   @moduledoc """
-  The behaviour of a fleet that can be watched and commanded while it runs.
+  Defines what a fleet can do that is watched and commanded while it runs.
 
   A view asks for the `scene/1` whenever it wants to draw, and passes on what people type as a
   command that `Console.Prompt` has checked.

@@ -1,7 +1,7 @@
 defmodule Console.Options do
   @moduledoc """
-  The options of `mix demo`, checked once when it starts. Pure. One table describes the options
-  and makes the help text.
+  Reads the options of `mix demo`, checked once when it starts. Pure. One table describes the options and makes the help
+  text.
   """
   alias Console.{Cli, Fleet}
   alias Console.Options.Page
@@ -59,12 +59,10 @@ defmodule Console.Options do
       iex> {options.robots, options.landmark}
       {[:mag1, :mag2, :min1], {-2.0, 1.0}}
       iex> Console.Options.parse(~w(--robots -3))
-      {:error, [~s(--robots cannot be "-3": a whole number from 1 to 1000 is allowed)]}
+      {:error, [~s(--robots: expected a whole number from 1 to 1000, got "-3")]}
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table(folder)),
          {:ok, options} <- fleet(pairs) do
       pairs
@@ -201,8 +199,7 @@ the prompt then takes pause, step, speed"},
       Page.table() ++
       [
         {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
-         "paint camera pictures, or skip the painting (painted)"},
-        {"help", nil, nil, "this text"}
+         "paint camera pictures, or skip the painting (painted)"}
       ]
   end
 

@@ -1,6 +1,6 @@
 defmodule Console.Page do
   @moduledoc """
-  A page in the browser that shows a live fleet and commands it, beside the terminal and by the same behaviour,
+  Serves a page in the browser that shows a live fleet and commands it, beside the terminal and by the same behaviour,
   `Console.Live`. No robot knows it: whether it falls, or a hundred slow browsers look, changes nothing for them.
 
       {:ok, _page, url} = Console.Page.start_link(module: Console.Live.Fleet, live: fleet, robots: [:mag1, :mag2])

@@ -1,7 +1,7 @@
 defmodule Console.Picture do
   @moduledoc """
-  A run as one drawing (SVG): the floor with each robot's path, a legend, and below it the
-  formation error over time, if there is a landmark or there was a formation. Pure; no fonts or files are needed to show it.
+  Draws a run as one picture (SVG): the floor with each robot's path, a legend, and below it the formation error over
+  time, if there is a landmark or there was a formation. Pure; no fonts or files are needed to show it.
   """
   alias Console.Cli.Format
   alias Console.Picture.{RunTrack, Svg}

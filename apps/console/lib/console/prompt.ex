@@ -42,11 +42,11 @@ defmodule Console.Prompt do
       iex> Console.Prompt.parse("step 10", [:mag1])
       {:ok, {:pace, {:step, 10}}}
       iex> Console.Prompt.parse("speed 1000", [:mag1])
-      {:error, ~s(speed cannot be "1000": a number from 0.1 to 100, or max, is allowed)}
+      {:error, ~s(speed: expected a number from 0.1 to 100, or max, got "1000")}
   """
   @spec parse(String.t(), [atom()]) :: {:ok, parsed()} | {:error, String.t()}
   def parse(text, _robots) when byte_size(text) > @most_bytes,
-    do: {:error, "this line is too long: at most #{@most_bytes} bytes are allowed"}
+    do: {:error, "expected a line of at most #{@most_bytes} bytes"}
 
   def parse(text, robots) do
     case String.split(text) do
@@ -317,7 +317,7 @@ defmodule Console.Prompt do
 
     case Parse.point(text) do
       {:ok, point} -> {:ok, build.(point)}
-      {:error, allowed} -> {:error, "#{form}: the place must be #{allowed}"}
+      {:error, allowed} -> {:error, "#{form}: expected a place, #{allowed}"}
     end
   end
 end

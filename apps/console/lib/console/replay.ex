@@ -21,7 +21,7 @@ defmodule Console.Replay do
   def run(%Options{} = options) do
     with :other <- Live.run(options),
          {:ok, file} <- Recording.File.open(options.file),
-         :ok <- Asked.check(options, file),
+         :ok <- asked(options, file),
          {:ok, status} <- follow(file, options) do
       status
     else
@@ -30,6 +30,11 @@ defmodule Console.Replay do
     end
   rescue
     error in Mcap.DamagedError -> refuse(Exception.message(error))
+  end
+
+  defp asked(options, file) do
+    names = for robot <- file.setup.robots, do: Atom.to_string(robot.id)
+    Asked.check(options, names, ["leader" | names], Recording.File.last_ms(file) / 1000)
   end
 
   defp follow(file, %{step: true} = options) do
@@ -87,7 +92,7 @@ defmodule Console.Replay do
         tick: nil,
         told: 0,
         differences: [],
-        drawn_ms: now(),
+        drawn_ms: Hal.Clock.now_ms(),
         output: output,
         until_ms: until_ms,
         quiet?: options.at_s != nil,
@@ -137,11 +142,11 @@ defmodule Console.Replay do
   defp draw(%{output: %Output{columns: nil}} = run), do: run
 
   defp draw(run) do
-    if now() - run.drawn_ms >= @progress_ms do
+    if Hal.Clock.now_ms() - run.drawn_ms >= @progress_ms do
       at_s = Replay.trial(run.replay).at_ms / 1000
       line = Progress.line(at_s, run.until_ms / 1000, "replayed", run.output.columns - 1)
       Output.progress(run.output, line)
-      %{run | drawn_ms: now()}
+      %{run | drawn_ms: Hal.Clock.now_ms()}
     else
       run
     end
@@ -154,8 +159,6 @@ defmodule Console.Replay do
     Enum.each(Enum.drop(stages, run.told), &Output.line(run.output, Format.stage(&1)))
     %{run | told: length(stages)}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 
   defp verdict(%{differences: []} = run) do
     [

@@ -1,6 +1,6 @@
 defmodule Console.Report do
   @moduledoc """
-  The report of a run: fixed keys in a fixed order, and the summary for people.
+  Writes the report of a run: fixed keys in a fixed order, and the summary for people.
 
   Lengths, angles and times are rounded to three decimals. Two runs from one seed give the same
   bytes, except for `wall_s`, the only key that depends on the machine.

@@ -1,6 +1,6 @@
 defmodule Console.Teleop do
   @moduledoc """
-  A hand on a robot: what keyboards (terminal and page) and gamepads say, as orders to move. Pure.
+  Turns what a hand does on keyboards (terminal and page) and gamepads into orders to move. Pure.
 
   The dead man's switch is the robot's own: each word is an order for 300 ms, or for 500 ms by the keys of a terminal, which
   tell that a key is down only by repeating it. Whatever is gone then, the hand, the window, its program or the network, the robot

@@ -1,7 +1,6 @@
 defmodule Console.Terminal do
   @moduledoc """
-  The full-screen view of a fleet as a function of a scene and a screen size: returns the text to
-  write. Pure.
+  Draws the full-screen view of a fleet as a function of a scene and a screen size: returns the text to write. Pure.
 
   From the top: the state of the fleet, the map beside the table of robots, the last stages,
   answers to commands, three things to try, the prompt.

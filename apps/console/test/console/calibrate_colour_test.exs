@@ -112,12 +112,12 @@ defmodule Console.CalibrateColourTest do
           {~w(sim --name A), "--box X,Y,WIDTH,HEIGHT or --point X,Y is missing"},
           {~w(sim --point 1,1), "--name NAME is missing"},
           {~w(sim --point 1,-1 --name A),
-           ~s(--point cannot be "1,-1": X,Y in pixels from the top left is allowed)},
-          {~w(sim a.png --point 1,1 --name A), "2 sources (sim, a.png): one is allowed"},
+           ~s(--point: expected X,Y in pixels from the top left, got "1,-1")},
+          {~w(sim a.png --point 1,1 --name A), "expected one source, got 2: sim, a.png"},
           {~w(sim --point 1,1 --name A --light 95),
-           ~s(--light cannot be "95": auto or a number from 0 to 90 is allowed)},
+           ~s(--light: expected auto or a number from 0 to 90, got "95")},
           {~w(sim --point 1,1 --name A --picture a.gif),
-           ~s(--picture cannot be "a.gif": a name that ends in .png or .jpg is allowed)},
+           ~s(--picture: expected a name that ends in .png or .jpg, got "a.gif")},
           {~w(sim --point 1,1 --name A --write), "--write needs --colours FILE"},
           {~w(sim --point 1,1 --name A --pciture a.png),
            ~s(unknown option --pciture; did you mean --picture?)}
@@ -125,7 +125,7 @@ defmodule Console.CalibrateColourTest do
       assert ColourOptions.parse(words) == {:error, [line]}
     end
 
-    assert {:error, ["--name cannot be \"a b\": one word of up to 60 letters is allowed"]} =
+    assert {:error, ["--name: expected one word of up to 60 letters, got \"a b\""]} =
              ColourOptions.parse(["sim", "--point", "1,1", "--name", "a b"])
   end
 end

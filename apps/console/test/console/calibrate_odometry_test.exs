@@ -258,13 +258,13 @@ defmodule Console.CalibrateOdometryTest do
 
   test "wrong arguments are reported", %{tmp_dir: folder} do
     for {words, line} <- [
-          {~w(mag1.exs --side 0.1), ~s(--side cannot be "0.1": a number from 1 to 20 is allowed)},
+          {~w(mag1.exs --side 0.1), ~s(--side: expected a number from 1 to 20, got "0.1")},
           {~w(mag1.exs --distance 0.1),
-           ~s(--distance cannot be "0.1": 0 or a number from 0.5 to 50 is allowed)},
+           ~s(--distance: expected 0 or a number from 0.5 to 50, got "0.1")},
           {~w(mag1.exs --squares 1e9),
-           ~s(--squares cannot be "1e9": a whole number from 0 to 50 is allowed)},
+           ~s(--squares: expected a whole number from 0 to 50, got "1e9")},
           {~w(mag1.exs --cw 1),
-           ~s(--cw cannot be "1": X,Y in metres, each from -1000 to 1000 is allowed)},
+           ~s(--cw: expected X,Y in metres, each from -1000 to 1000, got "1")},
           {~w(mag1.exs --seed 3), "--seed is for a simulated robot: add --simulate"},
           {~w(mag1.exs --simulate), "a simulated robot has no file: mag1.exs or --simulate"},
           {~w(mag1.exs mag2.exs), "one robot file at a time, not 2: mag1.exs, mag2.exs"},

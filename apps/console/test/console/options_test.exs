@@ -65,7 +65,7 @@ defmodule Console.OptionsTest do
 
     for wrong <- ~w(-1 1.5 dog:1 mag:x 101 nan) do
       assert error("--hardware #{wrong}") ==
-               "--hardware cannot be #{inspect(wrong)}: a whole number, or such as mag:1,min:1 (kinds mag and min), is allowed"
+               "--hardware: expected a whole number, or such as mag:1,min:1 (kinds mag and min), got #{inspect(wrong)}"
     end
 
     for {line, asked} <- [
@@ -87,27 +87,27 @@ defmodule Console.OptionsTest do
   test "a wrong value is named, with what is allowed" do
     for count <- ~w(0 -3 1e9 1001 six 6.5 99999999999999999999) do
       assert error("--robots #{count}") ==
-               "--robots cannot be #{inspect(count)}: a whole number from 1 to 1000 is allowed"
+               "--robots: expected a whole number from 1 to 1000, got #{inspect(count)}"
     end
 
     for loss <- ~w(nan NaN inf -inf Infinity 1.1 -0.1 1e400 .5 0,2) do
       assert error("--loss #{loss}") ==
-               "--loss cannot be #{inspect(loss)}: a number from 0 to 1 is allowed"
+               "--loss: expected a number from 0 to 1, got #{inspect(loss)}"
     end
 
     assert error("--map moon") =~ "hall, hospital, arena, clinic, "
 
     assert error("--map moon") =~
-             "doorway, rooms, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed"
+             "doorway, rooms, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT, got \"moon\""
 
     assert error("--map ofices") =~ "did you mean offices"
     assert error("--map hospitel") =~ "did you mean hospital"
     assert error("--map a.png:1x12") =~ "sides from 2 to 1000"
 
     assert error("--map a.yaml:9x12") ==
-             "--map cannot be \"a.yaml:9x12\": FILE.yaml is allowed; its description says how large the map is"
+             "--map: expected FILE.yaml, got \"a.yaml:9x12\"; its description says how large the map is"
 
-    assert error("--map a.png") =~ "such as a.png:16x12, is allowed; its size is missing"
+    assert error("--map a.png") =~ "such as a.png:16x12, got \"a.png\"; its size is missing"
     assert error("--map a.pgm:9,12") =~ "FILE.pgm:WIDTHxHEIGHT in metres"
     assert error("--map a.pgm:9,12") =~ "9,12 is not a size"
     assert error("--map a.jpg") =~ ".jpg is not read: save the picture as PNG"
@@ -159,10 +159,10 @@ defmodule Console.OptionsTest do
     assert options.mission == {Missions.Landmark, of: 4, policy: :majority}
 
     assert error("--mission patorl") ==
-             ~s(--mission: mission "patorl" is not known; one of landmark, patrol, flock, explore, teleop is allowed; did you mean patrol?)
+             ~s(--mission: mission "patorl" is not known; expected one of landmark, patrol, flock, explore, teleop; did you mean patrol?)
 
     assert error("--mission patrol:period=5") ==
-             "--mission: patrol option period cannot be 5: a number from 10 to 3600 s is allowed"
+             "--mission: patrol option period: expected a number from 10 to 3600 s, got 5"
 
     assert error("--save-map found.yaml --mission explore") ==
              "--save-map needs --headless, without --nodes and --hardware"

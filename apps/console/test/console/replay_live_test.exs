@@ -23,8 +23,8 @@ defmodule Console.ReplayLiveTest do
   defp record(path) do
     options = Runs.options("--headless --hardware 1 --robots 2 --duration 3", ["--record", path])
     assert Options.real_time?(options)
-    stop = [stop: &Live.Paced.stop/1]
-    heard(fn -> Live.Recording.run(options, &Demo.run(&1, Live.Paced, stop)) end)
+    stop = [stop: &Sim.Fleet.stop/1]
+    heard(fn -> Live.Recording.run(options, &Demo.run(&1, Sim.Fleet, stop)) end)
   end
 
   test "a live demo is recorded, and its robots replay one by one", %{tmp_dir: folder} do

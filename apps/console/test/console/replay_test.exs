@@ -104,7 +104,7 @@ defmodule Console.ReplayTest do
     assert [_next, _previous, _goto] = Regex.scan(~r/ killed .* is dead/, text)
     assert text =~ ~r/^mag1: /m
     assert text =~ ~s("gotto" is not known; did you mean goto?)
-    assert text =~ ~s(goto cannot be "30": a number from 0 to 25.0 is allowed)
+    assert text =~ ~s(goto: expected a number from 0 to 25.0, got "30")
     assert text =~ "   25.0 s  "
     assert text =~ "The recording ends here.\n"
     assert text =~ "next, previous    to the next event"
@@ -152,7 +152,7 @@ defmodule Console.ReplayTest do
     file = Path.join(folder, "file")
     File.write!(file, "")
     assert {:error, [line]} = Replay.Options.parse([path, "--csv", file])
-    assert line =~ ~r/^--csv cannot be ".*: a folder, not a file is allowed$/
+    assert line =~ ~r/^--csv: expected a folder, not a file, got ".*$/
     assert {1, "", line} = replay(path, "--csv /proc/none/tables")
     assert line =~ ~r{^replay: --csv /proc/none/tables cannot be written: .*\n$}
   end

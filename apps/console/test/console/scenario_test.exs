@@ -104,10 +104,13 @@ defmodule Console.ScenarioTest do
     refute told =~ "scenario: "
     wrong = file(folder, "c.exs", "[robots: 1,\n script: [{5, {:kill, :mag2}}]]")
     assert {{:shutdown, 1}, told} = task.([wrong])
-    assert told =~ "scenario: #{wrong}:2: script.1: cannot be {:kill, :mag2}"
+
+    assert told =~
+             "scenario: #{wrong}:2: script.1: expected a robot of this run, or :leader, got {:kill, :mag2}"
+
     nowhere = file(folder, "d.exs", "[map: \"mars\"]")
     assert {{:shutdown, 1}, told} = task.([nowhere])
-    assert told =~ "scenario: #{nowhere}: unknown map mars"
+    assert told =~ "scenario: #{nowhere}: map: expected"
     assert {{:shutdown, 1}, told} = task.([])
     assert told =~ "a file is missing"
     assert {{:shutdown, 1}, told} = task.(["--quite"])

@@ -1,8 +1,7 @@
 defmodule Hal.Camera do
   @moduledoc """
-  The behaviour of a source of frames, run by `Hal.Device`. The newest frame wins: an
-  implementation does not queue frames, but sends the next one when `next/1` asks for it. The
-  device calls `next/1` after it has passed on the previous frame.
+  Defines a source of frames, run by `Hal.Device`. The newest frame wins: an implementation does not queue frames, but
+  sends the next one when `next/1` asks for it. The device calls `next/1` after it has passed on the previous frame.
   """
 
   @typedoc """

@@ -1,10 +1,12 @@
 defmodule Hal.CommandOutput do
   @moduledoc """
-  The standard output of a command that people start, which may be lost: a disk is full, or nobody reads any more.
+  Guards the standard output of a command that people start, which may be lost: a disk is full, or nobody reads any
+  more.
 
   Erlang writes later, and tells nobody what became of it; only the next one that writes learns it. A command
   that prints once and ends would say that all went well.
   """
+  alias Hal.Options.Suggest
 
   # The status that a shell reports for a program whose output nobody reads any more, such as that of `head`.
   @unread 141
@@ -30,6 +32,49 @@ defmodule Hal.CommandOutput do
       if error.original == :terminated,
         do: exit({:shutdown, lost(name)}),
         else: reraise(error, __STACKTRACE__)
+  end
+
+  @doc """
+  Runs a Mix task with options of `OptionParser`: `carry_out` gets them and the other words. `--help` prints `help`; an error
+  of one or several lines is printed, and ends the task with status 1.
+  """
+  @spec run(
+          name :: String.t(),
+          words :: [String.t()],
+          help :: String.t(),
+          parser :: keyword(),
+          (keyword(), [String.t()] -> term() | {:error, String.t() | [String.t()]})
+        ) :: term()
+  def run(name, words, help, parser, carry_out) do
+    run(name, fn ->
+      case OptionParser.parse(words, parser) do
+        {_options, _words, [{option, nil} | _]} ->
+          refuse(unknown(option, parser[:strict]))
+
+        {_options, _words, [{option, text} | _]} ->
+          refuse("#{option}: expected another value, got #{text}")
+
+        {options, words, []} ->
+          if options[:help], do: help(help), else: told(carry_out.(options, words))
+      end
+    end)
+  end
+
+  defp help(text), do: Mix.shell().info(text)
+
+  defp told({:error, lines}), do: refuse(lines)
+  defp told(result), do: result
+
+  defp unknown(option, switches) do
+    names = for {name, _type} <- switches, do: "--" <> String.replace("#{name}", "_", "-")
+    "unknown option #{option}#{Suggest.hint(option, names)}"
+  end
+
+  @doc "Prints errors of a Mix task, and ends it with status 1."
+  @spec refuse(String.t() | [String.t()]) :: no_return()
+  def refuse(lines) do
+    lines |> List.wrap() |> Enum.each(&Mix.shell().error/1)
+    exit({:shutdown, 1})
   end
 
   defp outcome(command) do

@@ -1,7 +1,7 @@
 defmodule Hal.Device do
   @moduledoc """
-  The process that runs any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`): it opens the driver
-  after its own start, passes its readings on, and reopens it after errors.
+  Runs any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`) in a process: it opens the driver after its own start, passes
+  its readings on, and reopens it after errors.
 
   Options:
 

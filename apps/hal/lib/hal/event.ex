@@ -1,8 +1,7 @@
 defmodule Hal.Event do
   @moduledoc """
-  Events in telemetry's shape: what happened, numbers, and what it concerns. Libraries emit events
-  instead of logging them, and listeners attach functions. If `:telemetry` is loaded, it receives
-  every event too.
+  Reports events in telemetry's shape: what happened, numbers, and what it concerns. Libraries emit events instead of
+  logging them, and listeners attach functions. If `:telemetry` is loaded, it receives every event too.
 
   An event that is emitted before the `:hal` application has started is lost.
 

@@ -1,6 +1,6 @@
 defmodule Hal.Frame do
   @moduledoc """
-  One camera picture. Rows run from the top, pixels from the left.
+  Holds one camera picture. Rows run from the top, pixels from the left.
 
   | format | bytes |
   |---|---|

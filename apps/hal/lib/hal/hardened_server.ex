@@ -10,8 +10,8 @@ defmodule Hal.HardenedServer do
     * a system message (`:sys`) counts only if it comes from a process of this node and is one that
       `:sys` sends. Everything else in its shape is dropped, also while the process is suspended.
 
-  What a module itself does not know, it hands to `drop/1`, in the last clauses of its callbacks.
-  What is dropped is counted, and the event `[:hal, :server, :dropped]` reports it, at most once a
+  A module says `use Hal.HardenedServer` instead of `use GenServer`: what no clause of its callbacks
+  takes goes to `drop/1`. What is dropped is counted, and the event `[:hal, :server, :dropped]` reports it, at most once a
   minute for each process.
 
   It does not protect against whoever sends exactly what a process expects: with the cookie of a
@@ -22,6 +22,35 @@ defmodule Hal.HardenedServer do
   change of code while suspended.
   """
   alias Hal.HardenedServer.{Drops, Loop}
+
+  @doc false
+  defmacro __using__(options) do
+    quote do
+      @behaviour GenServer
+      @before_compile Hal.HardenedServer
+
+      @doc "The process as a child of a supervisor."
+      @spec child_spec(term()) :: Supervisor.child_spec()
+      def child_spec(arg) do
+        Supervisor.child_spec(
+          %{id: __MODULE__, start: {__MODULE__, :start_link, [arg]}},
+          unquote(options)
+        )
+      end
+
+      defoverridable child_spec: 1
+    end
+  end
+
+  # Not by `use GenServer`: its own callbacks would come before these.
+  @doc false
+  defmacro __before_compile__(_env) do
+    quote generated: true do
+      def handle_call(_unknown, _from, state), do: Hal.HardenedServer.drop(state)
+      def handle_cast(_unknown, state), do: Hal.HardenedServer.drop(state)
+      def handle_info(_unknown, state), do: Hal.HardenedServer.drop(state)
+    end
+  end
 
   @doc """
   Whether a term is an `{m, f, a}` that can be applied with `more` further arguments: a function that

@@ -1,7 +1,6 @@
 defmodule Hal.Json do
   @moduledoc """
-  A JSON encoder, small on purpose: the reports of this project need no more, and robots need no
-  further library.
+  Encodes JSON; small on purpose: the reports of this project need no more, and robots need no further library.
 
   | Elixir | JSON |
   |---|---|

@@ -1,7 +1,7 @@
 defmodule Hal.Options do
   @moduledoc """
-  The one checker of options: a table says what is allowed, and every error names the key, the
-  value and what is allowed, in the same words. Pure; creates no atoms.
+  Checks all options: a table says what is allowed, and every error names the key, what was expected and what came
+  instead, in the same words. Pure; creates no atoms.
 
   A table is a keyword list of types (`Hal.Options.Type`): `key: type`,
   `key: [type, required: true]` or `key: [type, default: value]`. An option whose default is `nil`
@@ -22,10 +22,10 @@ defmodule Hal.Options do
       iex> Hal.Options.check([port: "/dev/ttyS0"], table, "serial")
       {:ok, [baud: 300, port: "/dev/ttyS0"]}
       iex> Hal.Options.check([port: 5, baud: 0], table, "serial")
-      {:error, "serial option port cannot be 5: a path is allowed; " <>
-        "baud cannot be 0: a whole number from 1 to 9600 is allowed"}
+      {:error, "serial option port: expected a path, got 5; " <>
+        "baud: expected a whole number from 1 to 9600, got 0"}
       iex> Hal.Options.check([buad: 3], table, "serial")
-      {:error, "serial option buad is not known: allowed are port, baud; did you mean baud?; port is missing: a path is allowed"}
+      {:error, "serial option buad is not known: allowed are port, baud; did you mean baud?; port is missing: expected a path"}
   """
   @spec check(term(), table(), subject :: String.t()) :: {:ok, keyword()} | {:error, String.t()}
   def check(options, table, subject) do
@@ -56,7 +56,7 @@ defmodule Hal.Options do
   An error that a table cannot express, such as two options that do not fit together.
 
       iex> Hal.Options.refuse("rflex", [:limits, :max_turn], 2.0, "what the body can do, 0.9,")
-      {:error, "rflex option limits.max_turn cannot be 2.0: what the body can do, 0.9, is allowed"}
+      {:error, "rflex option limits.max_turn: expected what the body can do, 0.9, got 2.0"}
   """
   @spec refuse(String.t(), [atom()], term(), allowed :: String.t()) :: {:error, String.t()}
   def refuse(subject, path, value, allowed) do
@@ -71,7 +71,7 @@ defmodule Hal.Options do
       "robot option limits.max_turn is missing"
   """
   @spec line([Type.problem(), ...], subject :: String.t()) :: String.t()
-  def line([{[], text} | _], subject), do: "#{subject} options #{text}"
+  def line([{[], text} | _], subject), do: "#{subject} options: #{text}"
 
   def line(problems, subject) do
     {told, others} = Enum.split(problems, @told)
@@ -79,5 +79,6 @@ defmodule Hal.Options do
     "#{subject} option " <> Enum.map_join(told, "; ", &text/1) <> more
   end
 
+  defp text({path, "expected" <> _ = text}), do: "#{Wording.path(path)}: #{text}"
   defp text({path, text}), do: "#{Wording.path(path)} #{text}"
 end

@@ -1,7 +1,6 @@
 defmodule Hal.Pose do
   @moduledoc """
-  A position in metres and a heading in the plane: radians counter-clockwise from +x, in
-  `(-pi, pi]`.
+  Holds a position in metres and a heading in the plane: radians counter-clockwise from +x, in `(-pi, pi]`.
 
   Frames as in REP-105: `map` (shared by the fleet), `odom` (one robot's wheels), `base_link` (a
   robot's body: x forward, y left). Pure.

@@ -1,7 +1,6 @@
 defmodule Hal.Profile do
   @moduledoc """
-  The body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in
-  `base_link`.
+  Describes the body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in `base_link`.
 
   Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
@@ -114,16 +113,6 @@ defmodule Hal.Profile do
           Enum.map(left, fn {x, y, angle} -> Pose.new(x, -y, -angle) end)
     }
   end
-
-  @doc """
-  The profile of a robot, by the first three letters of its name as in the thesis: `mag1`, `min3`.
-
-      iex> Hal.Profile.of_kind(:mag).name
-      :magellan
-  """
-  @spec of_kind(:mag | :min) :: t()
-  def of_kind(:mag), do: magellan()
-  def of_kind(:min), do: atrv_mini()
 
   # Index 11 points straight ahead, and indices grow clockwise (public sample configuration).
   defp ring_pose(steps, radius) do

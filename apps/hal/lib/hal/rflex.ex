@@ -1,8 +1,8 @@
 defmodule Hal.RFlex do
   @moduledoc """
-  The byte protocol of the rFLEX motion controller (Magellan Pro, ATRV mini, B21r): frames,
-  commands, reports, and their meaning in metres and radians. All of it is pure except the parts
-  of the driver; the process and the line belong to `Hal.RFlex.Driver`.
+  Speaks the byte protocol of the rFLEX motion controller (Magellan Pro, ATRV mini, B21r): frames, commands, reports,
+  and their meaning in metres and radians. All of it is pure except the parts of the driver; the process and the line
+  belong to `Hal.RFlex.Driver`.
 
   | module | subject |
   |---|---|

@@ -1,7 +1,7 @@
 defmodule Hal.Serial do
   @moduledoc """
-  A serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet
-  boundaries are left to the caller.
+  Opens a serial line: raw bytes, 8 data bits, no parity, one stop bit, no flow control. Packet boundaries are left to
+  the caller.
 
       {:ok, line} = Hal.Serial.open(port: "/dev/ttyS0", speed: 115_200, last_words: stop)
       :ok = Hal.Serial.write(line, bytes)
@@ -145,7 +145,7 @@ defmodule Hal.Serial do
   Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Serial.options(port: "/dev/ttyS0", speed: 0)
-      {:error, "serial option speed cannot be 0: a whole number from 1 to 20000000 baud is allowed"}
+      {:error, "serial option speed: expected a whole number from 1 to 20000000 baud, got 0"}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def options(options) do
@@ -154,7 +154,7 @@ defmodule Hal.Serial do
 
   defp ends(options) do
     case {options[:port], options[:pty], options[:module]} do
-      {nil, nil, _} -> {:error, "serial option port is missing: the path of a device is allowed"}
+      {nil, nil, _} -> {:error, "serial option port is missing: expected the path of a device"}
       {_, nil, _} -> {:ok, options}
       {nil, _, Serial.Native} -> {:ok, options}
       {nil, _, module} -> refuse(:module, module, "Hal.Serial.Native where there is a pty")

@@ -19,7 +19,12 @@ defmodule Hal.Ticker do
   @doc "Sends the caller the first `message`, `first_ms` from now."
   @spec start(message :: term(), period_ms :: pos_integer(), first_ms :: non_neg_integer()) :: t()
   def start(message, period_ms, first_ms),
-    do: arm(%__MODULE__{message: message, period_ms: period_ms, due_ms: now() + first_ms})
+    do:
+      arm(%__MODULE__{
+        message: message,
+        period_ms: period_ms,
+        due_ms: Hal.Clock.now_ms() + first_ms
+      })
 
   @doc """
   Sends the caller the next message; for `nil`, when something else sets the pace, sends nothing.
@@ -29,7 +34,7 @@ defmodule Hal.Ticker do
   def next(nil), do: nil
 
   def next(%__MODULE__{} = ticker),
-    do: arm(%{ticker | due_ms: due(ticker.due_ms, ticker.period_ms, now())})
+    do: arm(%{ticker | due_ms: due(ticker.due_ms, ticker.period_ms, Hal.Clock.now_ms())})
 
   defp arm(ticker) do
     if ticker.timer, do: Process.cancel_timer(ticker.timer)
@@ -48,6 +53,4 @@ defmodule Hal.Ticker do
   @spec due(last_ms :: integer(), period_ms :: pos_integer(), now_ms :: integer()) :: integer()
   def due(last_ms, period_ms, now_ms),
     do: (last_ms + period_ms) |> max(now_ms) |> min(now_ms + period_ms)
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

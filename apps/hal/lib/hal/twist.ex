@@ -1,7 +1,6 @@
 defmodule Hal.Twist do
   @moduledoc """
-  The speed of a body in the plane: `linear` in m/s, forward positive; `turn` in rad/s, left
-  positive. Pure.
+  Holds the speed of a body in the plane: `linear` in m/s, forward positive; `turn` in rad/s, left positive. Pure.
   """
 
   @enforce_keys [:linear, :turn]

@@ -286,15 +286,15 @@ defmodule Hal.DeviceTest do
   end
 
   test "wrong options are named" do
-    assert_raise ArgumentError, ~r/kind cannot be :wheels: .*:drive, :ptz or :camera/, fn ->
+    assert_raise ArgumentError, ~r/kind: expected .*:drive, :ptz or :camera/, fn ->
       Device.start_link(kind: :wheels, driver: {Hal.FakeDrive, []})
     end
 
-    assert_raise ArgumentError, ~r/sonar cannot be 16: true or false is allowed/, fn ->
+    assert_raise ArgumentError, ~r/sonar: expected true or false, got 16/, fn ->
       Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, sonar: 16)
     end
 
-    assert_raise ArgumentError, ~r/driver cannot be Hal.FakeDrive/, fn ->
+    assert_raise ArgumentError, ~r/driver: expected .*, got Hal.FakeDrive/, fn ->
       Device.start_link(kind: :drive, driver: Hal.FakeDrive)
     end
   end

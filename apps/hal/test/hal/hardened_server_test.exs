@@ -6,7 +6,7 @@ defmodule Hal.HardenedServerTest do
   @moduletag :capture_log
 
   defmodule Counter do
-    use GenServer
+    use HardenedServer
 
     @impl GenServer
     def init({:stop, why}), do: {:stop, why}
@@ -27,19 +27,15 @@ defmodule Hal.HardenedServerTest do
     def handle_call(:last, _from, s), do: {:stop, :normal, :bye, s}
     def handle_call(:wait, _from, s), do: {:reply, :ok, s, 1}
     def handle_call(:raise, _from, _s), do: raise("on purpose")
-    def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
     @impl GenServer
     def handle_cast(:more, {test, n}), do: {:noreply, {test, n + 1}}
-    def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
     @impl GenServer
     def handle_info(:timeout, {test, _n} = s) do
       send(test, :timeout)
       {:noreply, s}
     end
-
-    def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
     @impl GenServer
     def terminate(reason, {test, _n}), do: send(test, {:terminated, reason})

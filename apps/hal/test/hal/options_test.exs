@@ -43,34 +43,34 @@ defmodule Hal.OptionsTest do
 
   test "what is wrong is one line with the key, the value and what is allowed" do
     wrong = [
-      {[port: "a\0b"], "port cannot be <<97, 0, 98>>: a path"},
-      {[port: ""], ~s|port cannot be "": a path|},
-      {[name: "a\nb"], ~S|name cannot be "a\nb": a name|},
-      {[name: <<0xFF>>], "name cannot be <<255>>: a name"},
-      {[port: nil], "port cannot be nil: a path"},
-      {[baud: 1.0], "baud cannot be 1.0: a whole number from 1 to 9600 baud is allowed"},
-      {[baud: Integer.pow(10, 400)], "baud cannot be 1000"},
+      {[port: "a\0b"], "port: expected a path, got <<97, 0, 98>>"},
+      {[port: ""], ~s|port: expected a path, got ""|},
+      {[name: "a\nb"], ~S|name: expected a name, got "a\nb"|},
+      {[name: <<0xFF>>], "name: expected a name, got <<255>>"},
+      {[port: nil], "port: expected a path, got nil"},
+      {[baud: 1.0], "baud: expected a whole number from 1 to 9600 baud, got 1.0"},
+      {[baud: Integer.pow(10, 400)], ~r/baud: expected .*, got 1000/},
       {[limits: [turn: 1.0e308]],
-       "limits.turn cannot be 1.0e308: a number from 0.0 to 1.0 rad/s"},
-      {[limits: [turn: :nan]], "limits.turn cannot be :nan"},
+       "limits.turn: expected a number from 0.0 to 1.0 rad/s, got 1.0e308"},
+      {[limits: [turn: :nan]], ~r/limits\.turn: expected .*, got :nan/},
       {[limits: [trun: 1]], "limits.trun is not known: allowed are turn; did you mean turn?"},
-      {[limits: 5], "limits cannot be 5: [key: value, …] with turn is allowed"},
-      {[banks: [17]], "banks.1 cannot be 17: a whole number from 0 to 16"},
-      {[banks: [1, 2, 3]], "banks cannot be [1, 2, 3]: a list of up to 2"},
-      {[banks: [1 | 2]], "banks cannot be [1 | 2]: a list of up to 2"},
-      {[style: "bit"],
-       ~s|style cannot be "bit": :bit or :address is allowed; did you mean :bit?|},
-      {[pace: {0, true}], "pace cannot be 0: a whole number from 1 to 50"},
-      {[pace: 7], "pace cannot be 7: :off or {ms, true} is allowed"},
-      {[lens: 3], "lens cannot be 3: an even number is allowed"},
+      {[limits: 5], "limits: expected [key: value, …] with turn, got 5"},
+      {[banks: [17]], ~r/banks\.1: expected a whole number from 0 to 16.*, got 17/},
+      {[banks: [1, 2, 3]], ~r/banks: expected a list of up to 2.*, got \[1, 2, 3\]/},
+      {[banks: [1 | 2]], ~r/banks: expected a list of up to 2.*, got \[1 \| 2\]/},
+      {[style: "bit"], ~s|style: expected :bit or :address, got "bit"; did you mean :bit?|},
+      {[pace: {0, true}], ~r/pace: expected a whole number from 1 to 50.*, got 0/},
+      {[pace: 7], "pace: expected :off or {ms, true}, got 7"},
+      {[lens: 3], "lens: expected an even number, got 3"},
       {[delay_ms: {5, 4}],
-       "delay_ms cannot be {5, 4}: {least, most}, whole ms from 0 to 500, is"},
-      {[address: <<0xFF>>], "address cannot be <<255>>: an IPv4 address such as"},
-      {[address: "10.0.0.256"], "address cannot be"},
-      {[address: {1, 2, 3}], "address cannot be {1, 2, 3}: an IPv4 address"},
-      {[seed: 1.0], "seed cannot be 1.0: a whole number is allowed"},
-      {[clock: :now], "clock cannot be :now: {module, function, arguments}"},
-      {[name: String.duplicate("x", 256)], "a name is allowed"},
+       "delay_ms: expected {least, most}, whole ms from 0 to 500, got {5, 4}"},
+      {[address: <<0xFF>>], "address: expected an IPv4 address such as"},
+      {[address: "10.0.0.256"],
+       ~s|address: expected an IPv4 address such as "10.0.0.7", got "10.0.0.256"|},
+      {[address: {1, 2, 3}], ~r/address: expected an IPv4 address .*, got \{1, 2, 3\}/},
+      {[seed: 1.0], "seed: expected a whole number, got 1.0"},
+      {[clock: :now], "clock: expected {module, function, arguments}"},
+      {[name: String.duplicate("x", 256)], "expected a name"},
       {[name: "a", name: "b"], "name is given twice"},
       {[{"nobody's option", 1}], "nobody's option is not known: allowed are port, baud"}
     ]
@@ -85,7 +85,7 @@ defmodule Hal.OptionsTest do
     end
 
     for options <- [:port, nil, [:port], [{1, 2}], [{:port, "a"} | 3], %{port: "a"}] do
-      assert {:error, "test options cannot be " <> _} = Options.check(options, @table, "test")
+      assert {:error, "test options: expected " <> _} = Options.check(options, @table, "test")
     end
   end
 

@@ -1,7 +1,7 @@
 defmodule Mcap.Channel do
   @moduledoc """
-  A stream of messages of one kind in one file: its topic, how each message is encoded (`"json"`), and the schema
-  that describes them, if there is one.
+  Describes a stream of messages of one kind in one file: its topic, how each message is encoded (`"json"`), and the
+  schema that describes them, if there is one.
   """
 
   @enforce_keys [:id, :topic, :message_encoding, :schema, :metadata]

@@ -1,4 +1,4 @@
 defmodule Mcap.DamagedError do
-  @moduledoc "A chunk in the middle of a recording is not as it was written. The message is one line."
+  @moduledoc "Says that a chunk in the middle of a recording is not as it was written. The message is one line."
   defexception [:message]
 end

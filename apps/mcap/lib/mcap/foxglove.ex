@@ -122,26 +122,6 @@ defmodule Mcap.Foxglove do
   end
 
   @doc """
-  `foxglove.LaserScan`: ranges in metres, counter-clockwise from the first beam's angle to the last one's, seen from the
-  sensor's pose. Of intensities there are as many as ranges, or none.
-  """
-  @spec laser_scan(
-          non_neg_integer(),
-          String.t(),
-          Encode.pose(),
-          {first :: number(), last :: number()},
-          ranges :: [number()],
-          intensities :: [number()]
-        ) :: iodata()
-  def laser_scan(ns, frame_id, pose, {first, last}, ranges, intensities \\ []) do
-    [
-      [stamp(ns, frame_id), ~S(,"pose":), pose(pose), ~S(,"start_angle":), number(first)],
-      [~S(,"end_angle":), number(last), ~S(,"ranges":), array(ranges, &number/1)],
-      [~S(,"intensities":), array(intensities, &number/1), ?}]
-    ]
-  end
-
-  @doc """
   `foxglove.Grid`: a map of cells, row after row in the direction of +y from the corner `pose`. `cell_size` is in
   metres, `row_stride` and `cell_stride` in bytes; `fields` are `{name, offset, type}` of a cell, with the types `:u8`,
   `:i8`, `:u16`, `:i16`, `:u32`, `:i32`, `:f32` and `:f64`.

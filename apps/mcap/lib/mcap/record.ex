@@ -1,7 +1,7 @@
 defmodule Mcap.Record do
   @moduledoc """
-  The records of an MCAP file as bytes: an opcode, the length of the content, the content. Pure; `Mcap.Record.Parse`
-  is the other direction.
+  Encodes the records of an MCAP file as bytes: an opcode, the length of the content, the content. Pure;
+  `Mcap.Record.Parse` is the other direction.
   """
 
   @u32 0xFFFF_FFFF

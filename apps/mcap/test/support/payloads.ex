@@ -49,8 +49,6 @@ defmodule Mcap.Payloads do
       {"foxglove.ImageAnnotations",
        Foxglove.image_boxes(ns, [{{1, 2, 10.5, 20}, "Red"}, {{3, 4, 5, 6}, ""}], blue)},
       {"foxglove.Log", Foxglove.log(ns, :warning, "mag1", "said \"ü\" and \t" <> <<0xFF>>)},
-      {"foxglove.LaserScan",
-       Foxglove.laser_scan(ns, "mag1", pose, {-1.5, 1.5}, [0.5, 1, 1.0e-7], [1, 2, 3])},
       {"foxglove.Grid", Foxglove.grid(ns, "map", grid)}
     ]
   end

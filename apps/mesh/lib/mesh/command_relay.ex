@@ -7,7 +7,7 @@ defmodule Mesh.CommandRelay do
   (`c:Mesh.Consumer.command/2`). The answer returns the same way. No process waits: a request that
   cannot be passed on is lost, and the caller gives up by itself.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Mesh.Nonblocking
   alias Mesh.Protocol.WireTerm
@@ -38,10 +38,6 @@ defmodule Mesh.CommandRelay do
   @impl GenServer
   def init(consumer), do: {:ok, %{consumer: consumer, asked: %{}}}
 
-  # It has a name that connected nodes can send to, so anything may arrive here.
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:there, [], [_ | _] = back, robot, request, ref}, s) when is_tuple(request) do
     if WireTerm.name?(robot) and is_reference(ref) and nodes?(back) and map_size(s.asked) < @most,
@@ -66,8 +62,6 @@ defmodule Mesh.CommandRelay do
     {:noreply, s}
   end
 
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({:forget, own}, s) when is_map_key(s.asked, own) do
     :erlang.unalias(own)
@@ -80,8 +74,6 @@ defmodule Mesh.CommandRelay do
     forward(next, {:back, rest, ref, answer})
     {:noreply, %{s | asked: asked}}
   end
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # The robot answers this process, which knows the way back.
   defp ask(s, robot, request, ref, back) do

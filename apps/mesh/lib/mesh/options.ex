@@ -1,6 +1,6 @@
 defmodule Mesh.Options do
   @moduledoc """
-  The options of a node's mesh, checked once.
+  Checks the options of a node's mesh, once.
 
   | option | |
   |---|---|
@@ -216,6 +216,6 @@ defmodule Mesh.Options do
 
   defp begin(other) do
     {:error, [{[], text}]} = Options.Wording.refuse("{Module, options}", other)
-    {:error, "strategies #{text}"}
+    {:error, "strategies: #{text}"}
   end
 end

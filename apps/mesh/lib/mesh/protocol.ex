@@ -1,7 +1,7 @@
 defmodule Mesh.Protocol do
   @moduledoc """
-  A node's radio as a pure function: datagrams and time in, datagrams and deliveries out.
-  `Mesh.Server` is the process round it.
+  Models a node's radio as a pure function: datagrams and time in, datagrams and deliveries out. `Mesh.Server` is the
+  process round it.
 
   | effect | means |
   |---|---|

@@ -1,13 +1,13 @@
 defmodule Mesh.Server do
   @moduledoc """
-  The process around `Mesh.Protocol`: it owns the sockets, keeps the time and carries out effects.
-  What others ask often is in a table that all processes can read (`Mesh.Table`). What it hears
-  goes to the consumer that it gets at its start (`Mesh.Consumer`).
+  Runs the process around `Mesh.Protocol`: owns the sockets, keeps the time and carries out effects. What others ask
+  often is in a table that all processes can read (`Mesh.Table`). What it hears goes to the consumer that it gets at its
+  start (`Mesh.Consumer`).
 
   It follows the cards and addresses of the machine, five times a second (`Mesh.Interface`). Sockets that cannot be
   opened are tried again with back-off; a robot without a network drives on, and says so (`Mesh.fault/0`).
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Mesh.Distribution
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Secret, Sockets, Table}
@@ -52,7 +52,7 @@ defmodule Mesh.Server do
       machine: machine([]),
       sockets: nil,
       closed: nil,
-      backoff: Backoff.new(now()),
+      backoff: Backoff.new(Hal.Clock.now_ms()),
       fault: %Fault{},
       lately: :nothing,
       written: written,
@@ -60,7 +60,7 @@ defmodule Mesh.Server do
       ticks: 0,
       sent: 0,
       heard: 0,
-      next: now()
+      next: Hal.Clock.now_ms()
     }
 
     {:ok, s |> connect() |> publish() |> schedule()}
@@ -76,13 +76,14 @@ defmodule Mesh.Server do
   @impl GenServer
   def handle_cast({:speak, to, message}, s) do
     if to == :all or WireTerm.names?(to),
-      do: {:noreply, run(s, Mesh.Protocol.speak(s.protocol, to, message, now()))},
+      do: {:noreply, run(s, Mesh.Protocol.speak(s.protocol, to, message, Hal.Clock.now_ms()))},
       else: {:noreply, s}
   end
 
   def handle_cast({:serve, service, to, term}, %{services: services} = s)
       when is_map_key(services, service) and is_atom(to),
-      do: {:noreply, run(s, Mesh.Protocol.serve(s.protocol, service, to, term, now()))}
+      do:
+        {:noreply, run(s, Mesh.Protocol.serve(s.protocol, service, to, term, Hal.Clock.now_ms()))}
 
   # To a node that the distribution is connected to, for whatever reason.
   def handle_cast({:introduce, node}, s) when is_atom(node) do
@@ -93,12 +94,9 @@ defmodule Mesh.Server do
   def handle_cast({:knock, node, port}, s) when is_atom(node) and port in 1..65_535 do
     case ip(node) do
       nil -> {:noreply, s}
-      ip -> {:noreply, run(s, Mesh.Protocol.knock(s.protocol, {ip, port}, now()))}
+      ip -> {:noreply, run(s, Mesh.Protocol.knock(s.protocol, {ip, port}, Hal.Clock.now_ms()))}
     end
   end
-
-  # Connected nodes may send anything.
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_call(:counts, _from, s) do
@@ -112,13 +110,11 @@ defmodule Mesh.Server do
     {:reply, {:ok, :crypto.mac(:hmac, :sha256, key, bytes)}, s}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
       when socket == sockets.own or socket == sockets.group do
     s = %{s | heard: s.heard + 1}
-    {:noreply, run(s, Mesh.Protocol.hear(s.protocol, datagram, {ip, port}, now()))}
+    {:noreply, run(s, Mesh.Protocol.hear(s.protocol, datagram, {ip, port}, Hal.Clock.now_ms()))}
   end
 
   def handle_info({:udp_passive, socket}, %{sockets: %Sockets{} = sockets} = s)
@@ -130,13 +126,12 @@ defmodule Mesh.Server do
   def handle_info(:tick, s) do
     {chance, state} = :rand.uniform_s(s.chance)
     s = connect(%{s | chance: state, ticks: s.ticks + 1, machine: machine(s.machine)})
-    s = run(s, Mesh.Protocol.tick(s.protocol, Dialer.links(), now(), chance))
+    s = run(s, Mesh.Protocol.tick(s.protocol, Dialer.links(), Hal.Clock.now_ms(), chance))
     {:noreply, s |> judge() |> publish() |> schedule()}
   end
 
   # A reset of the network shows as an error on the socket.
   def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # Cards and addresses come and go at any time. If the system does not tell, they are as before.
   defp machine(before) do
@@ -158,13 +153,13 @@ defmodule Mesh.Server do
   defp open(%{sockets: nil} = s, nil), do: s
 
   defp open(%{sockets: nil} = s, ip),
-    do: if(Backoff.due?(s.backoff, now()), do: try_open(s, ip), else: s)
+    do: if(Backoff.due?(s.backoff, Hal.Clock.now_ms()), do: try_open(s, ip), else: s)
 
   defp open(%{sockets: %{ip: ip}} = s, ip), do: s
 
   defp open(s, ip) do
     :ok = Sockets.close(s.sockets)
-    open(%{s | sockets: nil, backoff: Backoff.new(now())}, ip)
+    open(%{s | sockets: nil, backoff: Backoff.new(Hal.Clock.now_ms())}, ip)
   end
 
   defp try_open(s, ip) do
@@ -175,7 +170,13 @@ defmodule Mesh.Server do
       {:error, reason} ->
         {chance, state} = :rand.uniform_s(s.chance)
         closed = "no UDP on #{Interface.text(ip)}, port #{s.options.port}: #{words(reason)}"
-        %{s | closed: closed, chance: state, backoff: Backoff.tried(s.backoff, now(), chance)}
+
+        %{
+          s
+          | closed: closed,
+            chance: state,
+            backoff: Backoff.tried(s.backoff, Hal.Clock.now_ms(), chance)
+        }
     end
   end
 
@@ -198,12 +199,17 @@ defmodule Mesh.Server do
   # Whoever is heard shows that there is a network.
   defp judge(s) do
     heard? = NodeTable.addresses(s.protocol.node_table) != []
-    {fault, news} = Fault.tick(s.fault, if(heard?, do: nil, else: trouble(s)), now())
+    {fault, news} = Fault.tick(s.fault, if(heard?, do: nil, else: trouble(s)), Hal.Clock.now_ms())
 
     case news do
-      {:fault, line} -> Event.execute([:mesh, :no_network], %{at_ms: now()}, %{line: line})
-      :healed -> Event.execute([:mesh, :network], %{at_ms: now()}, %{})
-      nil -> :ok
+      {:fault, line} ->
+        Event.execute([:mesh, :no_network], %{at_ms: Hal.Clock.now_ms()}, %{line: line})
+
+      :healed ->
+        Event.execute([:mesh, :network], %{at_ms: Hal.Clock.now_ms()}, %{})
+
+      nil ->
+        :ok
     end
 
     %{s | fault: fault, lately: if(s.lately == :sent, do: :nothing, else: s.lately)}
@@ -242,7 +248,7 @@ defmodule Mesh.Server do
   end
 
   defp carry_out({:beat, robot, node, beat}, s) do
-    Table.beat(robot, node, beat, now())
+    Table.beat(robot, node, beat, Hal.Clock.now_ms())
     s
   end
 
@@ -258,7 +264,7 @@ defmodule Mesh.Server do
   end
 
   defp carry_out({:node, change, node}, s) do
-    Event.execute([:mesh, change], %{at_ms: now()}, %{node: node})
+    Event.execute([:mesh, change], %{at_ms: Hal.Clock.now_ms()}, %{node: node})
     Dialer.note(change, node)
     s
   end
@@ -269,7 +275,7 @@ defmodule Mesh.Server do
   end
 
   defp carry_out({:event, name, about}, s) do
-    Event.execute([:mesh, name], %{at_ms: now()}, about)
+    Event.execute([:mesh, name], %{at_ms: Hal.Clock.now_ms()}, about)
     s
   end
 
@@ -278,10 +284,12 @@ defmodule Mesh.Server do
     :ok =
       Distribution.Access.heard(
         for({ip, _port} <- NodeTable.addresses(node_table), do: ip),
-        now()
+        Hal.Clock.now_ms()
       )
 
-    written = Table.write(s.written, node_table, roster, rejected, s.fault.told, now())
+    written =
+      Table.write(s.written, node_table, roster, rejected, s.fault.told, Hal.Clock.now_ms())
+
     %{s | written: written}
   end
 
@@ -296,10 +304,8 @@ defmodule Mesh.Server do
   end
 
   defp schedule(s) do
-    next = max(s.next + @tick_ms, now())
+    next = max(s.next + @tick_ms, Hal.Clock.now_ms())
     Process.send_after(self(), :tick, next, abs: true)
     %{s | next: next}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,7 +1,7 @@
 defmodule Mesh.Sockets do
   @moduledoc """
-  A node's two UDP sockets: one for sending and for its own address, and one that listens to the
-  multicast group, which all nodes of a machine share.
+  Opens a node's two UDP sockets: one for sending and for its own address, and one that listens to the multicast group,
+  which all nodes of a machine share.
 
   The group is joined, and spoken to, by each address in `on`, whatever the routes of the machine say: the kernel by
   itself would choose one card for a group, or none where no default route is.

@@ -1,6 +1,6 @@
 defmodule Mesh.Supervisor do
   @moduledoc """
-  The processes of a node's mesh.
+  Supervises the processes of a node's mesh.
 
       Mesh.Supervisor (rest_for_one)
       |-- Mesh.Server                    signed datagrams: beacons, heartbeats, rounds, rows, stops

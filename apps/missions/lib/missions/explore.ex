@@ -1,7 +1,7 @@
 defmodule Missions.Explore do
   @moduledoc """
-  The exploration: robots that see all of a building that they do not know, and make its map together (R92). Pure; written
-  with the interface of `Robot.Mission` alone.
+  Explores: robots see all of a building that they do not know, and make its map together (R92). Pure; written with the
+  interface of `Robot.Mission` alone.
 
   Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
   they estimate. Once a second it looks for the frontiers of what is known (`.Frontiers`), chooses one (`.Choice`), and tells

@@ -1,7 +1,7 @@
 defmodule Missions.Flock do
   @moduledoc """
-  The flock: robots that keep together at a spacing, and go along a course, without a leader and without places
-  (Olfati-Saber 2006). Pure; written with the interface of `Robot.Mission` alone.
+  Flocks: robots keep together at a spacing, and go along a course, without a leader and without places (Olfati-Saber
+  2006). Pure; written with the interface of `Robot.Mission` alone.
 
   Each tick a robot takes its acceleration from its neighbours, from the echoes of its sonars that no robot explains, and
   from the present point of the course (`Missions.Flock.Field`), makes its velocity of it (`.Motion`), and drives with that
@@ -35,8 +35,9 @@ defmodule Missions.Flock do
   # Who has just begun has not heard all members yet.
   @first_ms 5_000
 
-  @enforce_keys [:me, :spacing, :speed, :course, :plan]
-  defstruct @enforce_keys ++
+  @kept [:me, :spacing, :speed, :course, :plan]
+  @enforce_keys @kept
+  defstruct @kept ++
               [
                 now_ms: nil,
                 since_ms: nil,
@@ -112,10 +113,8 @@ defmodule Missions.Flock do
   end
 
   @impl Robot.Mission
-  def halted(mission) do
-    kept = [:me, :spacing, :speed, :course, :plan]
-    struct!(__MODULE__, mission |> Map.take(kept) |> Map.to_list())
-  end
+  def halted(mission),
+    do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])

@@ -1,9 +1,9 @@
 defmodule Missions.Landmark do
   @moduledoc """
-  The landmark mission (R58 to R60): search for the landmark, agree on who sees it largest, and
-  follow that robot in formation while a person moves the landmark. Pure: events in, effects out.
-  `Missions.Landmark.Transitions` is the table of its phases, with its `.Conditions` and what a phase
-  begins with (`.Entry`); the parts of the mission are modules of their own:
+  Carries out the landmark mission (R58 to R60): searches for the landmark, agrees on who sees it largest, and follows
+  that robot in formation while a person moves the landmark. Pure: events in, effects out.
+  `Missions.Landmark.Transitions` is the table of its phases, with its `.Conditions` and what a phase begins with
+  (`.Entry`); the parts of the mission are modules of their own:
 
   | part | decides |
   |---|---|
@@ -74,6 +74,10 @@ defmodule Missions.Landmark do
 
   @impl Robot.Mission
   def commands, do: [:formation]
+
+  @impl Robot.Mission
+  def roles,
+    do: %{lead: :leads, follow: :follows, search: :searches, rest: :rests, elected: :elects}
 
   @impl Robot.Mission
   defdelegate explain(mission), to: Landmark.Explanation, as: :lines

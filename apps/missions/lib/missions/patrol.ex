@@ -1,7 +1,8 @@
 defmodule Missions.Patrol do
   @moduledoc """
-  The patrol: points that are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
-  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of `Robot.Mission` alone.
+  Patrols: points are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
+  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
+  `Robot.Mission` alone.
 
   A point is due when nobody has seen it for a quarter of the `period`; whoever is within 0.5 m of it sees it. Each robot
   tells the others once a second, and at once when that changes, at which point it is, and how long ago every point was
@@ -28,8 +29,9 @@ defmodule Missions.Patrol do
   @day_ms 86_400_000
   @longest_step_ms 1_000
 
-  @enforce_keys [:me, :points, :plan, :period_ms, :by]
-  defstruct @enforce_keys ++
+  @kept [:me, :points, :plan, :period_ms, :by]
+  @enforce_keys @kept
+  defstruct @kept ++
               [
                 now_ms: nil,
                 seen: %{},
@@ -100,10 +102,8 @@ defmodule Missions.Patrol do
   end
 
   @impl Robot.Mission
-  def halted(mission) do
-    kept = [:me, :points, :plan, :period_ms, :by]
-    struct!(__MODULE__, mission |> Map.take(kept) |> Map.to_list())
-  end
+  def halted(mission),
+    do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])

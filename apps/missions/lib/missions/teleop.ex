@@ -1,8 +1,8 @@
 defmodule Missions.Teleop do
   @moduledoc """
-  A robot that a person drives, by keyboard or gamepad (R17, R75). It stands until somebody says `move`, drives while that is
-  said again, and stands again when nobody has said it for `dead_man` seconds, whatever is gone: the hand, the window, its machine or
-  the network. Pure; written with the interface of `Robot.Mission` alone.
+  Lets a person drive a robot, by keyboard or gamepad (R17, R75). It stands until somebody says `move`, drives while
+  that is said again, and stands again when nobody has said it for `dead_man` seconds, whatever is gone: the hand, the
+  window, its machine or the network. Pure; written with the interface of `Robot.Mission` alone.
 
   Options: `speed` (m/s) and `turn` (rad/s), beyond which it drives for nobody, and `dead_man` (s). The limits of the body,
   sonars and bumpers, and all stops are not its business: they hold besides.

@@ -76,17 +76,17 @@ defmodule Swarm.MemberSpecTest do
     """
 
     assert lines(text) == [
-             "mag1.exs:2: policies.formation: cannot be :colum: :column, :line, :wedge, :triangle, :diamond or :circle is allowed; did you mean :column?",
+             "mag1.exs:2: policies.formation: expected :column, :line, :wedge, :triangle, :diamond or :circle, got :colum; did you mean :column?",
              "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
-             "mag1.exs:3: policies.of: cannot be 0: a whole number from 1 to 1000 robots of the fleet is allowed",
+             "mag1.exs:3: policies.of: expected a whole number from 1 to 1000 robots of the fleet, got 0",
              "mag1.exs:4: network.zzz: is not known: allowed are secret_file, interface, port, multicast, peers, addresses, dist_port, allow, full_mesh, degree",
-             "mag1.exs:4: network.port: cannot be -1: a whole number from 0 to 65535 is allowed",
-             "mag1.exs:5: network.multicast: cannot be 0: a whole number from 1 to 65535 is allowed",
-             "mag1.exs:5: network.peers.1: cannot be \"10.0.0.7\": address and port, such as \"10.0.0.7:4370\", is allowed"
+             "mag1.exs:4: network.port: expected a whole number from 0 to 65535, got -1",
+             "mag1.exs:5: network.multicast: expected a whole number from 1 to 65535, got 0",
+             "mag1.exs:5: network.peers.1: expected address and port, such as \"10.0.0.7:4370\", got \"10.0.0.7\""
            ]
 
     assert lines("policies: [mission: :landmrk, formation: 3]") == [
-             "mag1.exs:2: policies.mission: cannot be :landmrk: nil, :landmark, :patrol, :flock, :explore or :teleop is allowed; did you mean :landmark?"
+             "mag1.exs:2: policies.mission: expected nil, :landmark, :patrol, :flock, :explore or :teleop, got :landmrk; did you mean :landmark?"
            ]
 
     assert [line] = lines("policies: [policy: :majority]")

@@ -123,9 +123,8 @@ defmodule Player.Units do
   @spec radians(number()) :: float()
   def radians(angle), do: Float.round(angle * 1.0, 6)
 
-  @doc "A length, rounded to a micrometre: further digits come from a division."
-  @spec metres(number()) :: float()
-  def metres(length), do: Float.round(length * 1.0, 6)
+  # A length, rounded to a micrometre: further digits come from a division.
+  defp metres(length), do: Float.round(length * 1.0, 6)
 
   defp scale(places, factor),
     do: for({x, y, angle} <- places, do: {metres(x * factor), metres(y * factor), angle})

@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour do
   @moduledoc """
-  A behaviour turns what a robot perceives into a wish, one tick (100 ms) at a time. It is pure:
-  no clock, no process, no random numbers; the time is `percept.at_ms`.
+  Turns what a robot perceives into a wish, one tick (100 ms) at a time. It is pure: no clock, no process, no random
+  numbers; the time is `percept.at_ms`.
 
   A running behaviour is a pair `{module, state}`, so that behaviours can hold, start and combine
   others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It runs until it reports an
@@ -40,15 +40,15 @@ defmodule Robot.Behaviour do
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0})
       :ok
       iex> Robot.Behaviour.check({NoSuchModule, []})
-      {:error, "NoSuchModule is not a behaviour: a module with new/1 and tick/2 is allowed"}
+      {:error, "expected a behaviour, a module with new/1 and tick/2, got NoSuchModule"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: :far, y: 2.0})
-      {:error, "Robot.Behaviour.Goto: goto option x cannot be :far: a number from -1.0e6 to 1.0e6 m is allowed"}
+      {:error, "Robot.Behaviour.Goto: goto option x: expected a number from -1.0e6 to 1.0e6 m, got :far"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, discs: :junk})
-      {:error, "option discs cannot be :junk: [{x, y, radius}] in metres is allowed"}
+      {:error, "option discs: expected [{x, y, radius}] in metres, got :junk"}
       iex> Robot.Behaviour.check({Robot.Behaviour.Goto, x: 1.0, y: 2.0, unmapped: 1})
-      {:error, "option unmapped cannot be 1: true or false is allowed"}
+      {:error, "option unmapped: expected true or false, got 1"}
       iex> {:error, line} = Robot.Behaviour.check({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: 0.0}})
-      iex> line =~ "option target cannot be %Hal.Pose{" and line =~ ": a %Hal.Pose{} in metres and radians is allowed"
+      iex> line =~ "option target: expected a %Hal.Pose{} in metres and radians, got %Hal.Pose{"
       true
   """
   @spec check(term()) :: :ok | {:error, line :: String.t()}
@@ -57,7 +57,7 @@ defmodule Robot.Behaviour do
   def check({module, options}) when is_atom(module) and is_list(options) do
     cond do
       not Keyword.keyword?(options) ->
-        {:error, "#{inspect(module)}: #{brief(options)} are not options: [key: value] is allowed"}
+        {:error, "#{inspect(module)}: expected options [key: value], got #{brief(options)}"}
 
       Code.ensure_loaded?(module) and function_exported?(module, :new, 1) and
           function_exported?(module, :tick, 2) ->
@@ -66,13 +66,12 @@ defmodule Robot.Behaviour do
              do: made(module, Keyword.drop(options, [:discs, :unmapped]))
 
       true ->
-        {:error,
-         "#{inspect(module)} is not a behaviour: a module with new/1 and tick/2 is allowed"}
+        {:error, "expected a behaviour, a module with new/1 and tick/2, got #{inspect(module)}"}
     end
   end
 
   def check(other),
-    do: {:error, "#{brief(other)} is not a goal: {module, options} or nil is allowed"}
+    do: {:error, "expected a goal {module, options} or nil, got #{brief(other)}"}
 
   # Every goal accepts these options in addition to its own (`Robot.Behaviour.Avoid`).
   defp discs(options) do
@@ -80,14 +79,13 @@ defmodule Robot.Behaviour do
 
     if discs?(discs),
       do: :ok,
-      else:
-        {:error, "option discs cannot be #{brief(discs)}: [{x, y, radius}] in metres is allowed"}
+      else: {:error, "option discs: expected [{x, y, radius}] in metres, got #{brief(discs)}"}
   end
 
   defp unmapped(unmapped?) when unmapped? in [nil, true, false], do: :ok
 
   defp unmapped(other),
-    do: {:error, "option unmapped cannot be #{brief(other)}: true or false is allowed"}
+    do: {:error, "option unmapped: expected true or false, got #{brief(other)}"}
 
   @doc "Whether a term is a list of discs to avoid: `[{x, y, radius}]` in the map frame, metres."
   @spec discs?(term()) :: boolean()
@@ -129,8 +127,21 @@ defmodule Robot.Behaviour do
   end
 
   @doc """
-  Whether these options change nothing, for `c:update/2`: a mission repeats its goal at each tick, and need not be
-  checked again. `keys` are the options that the behaviour keeps in its state.
+  Changes these options, for `c:update/2`, by the check of `c:new/1`. `keys` are the options that the behaviour keeps in its
+  state.
+  """
+  @spec change(module(), keyword(), state :: map(), keys :: [atom()]) :: t()
+  def change(module, options, state, keys) do
+    if same?(options, state, keys) do
+      {module, state}
+    else
+      {_, fresh} = module.new(state |> Map.take(keys) |> Map.to_list() |> Keyword.merge(options))
+      {module, Map.merge(state, Map.take(fresh, keys))}
+    end
+  end
+
+  @doc """
+  Whether these options change nothing: a mission repeats its goal at each tick, and need not be checked again.
 
       iex> state = %{near: 1.5, mode: :going}
       iex> for options <- [[near: 1.5], [near: 1.6], [mode: :going]],

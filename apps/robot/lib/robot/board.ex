@@ -1,6 +1,6 @@
 defmodule Robot.Board do
   @moduledoc """
-  The newest readings of one robot, which any process on its node can read without a message.
+  Holds the newest readings of one robot, which any process on its node can read without a message.
 
   One ETS table of entries `{key, value, at_ms}`. Readers give the greatest age that they accept.
   Each key has one writer, and `put/5` raises for any other:
@@ -56,7 +56,7 @@ defmodule Robot.Board do
   latched. With a file (real robots) it also survives a restart of the board and of the machine: the
   file exists while the latch is set. Who must know that it does asks by `saved/2`.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Robot.Board.Files
   alias Robot.{Departure, Names}
@@ -291,9 +291,6 @@ defmodule Robot.Board do
   end
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
   def handle_cast(:latch, s), do: {:noreply, save(s)}
 
   # The latch itself decides, not the order in which the messages of several processes arrive.
@@ -308,11 +305,9 @@ defmodule Robot.Board do
   end
 
   def handle_cast(:depart, s), do: {:noreply, noted(s)}
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(:depart, s), do: {:noreply, noted(s)}
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp save({board, files} = s) do
     latched? = latched?(board)

@@ -1,8 +1,7 @@
 defmodule Robot.Command do
   @moduledoc """
-  Text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a
-  case-insensitive keyword and its arguments. Pure; parsing never creates atoms from its input and
-  does not raise.
+  Parses text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a case-insensitive
+  keyword and its arguments. Pure; parsing never creates atoms from its input and does not raise.
 
   | text | command |
   |---|---|
@@ -93,11 +92,11 @@ defmodule Robot.Command do
       iex> Robot.Command.parse("followtheleader:mag1", [:mag1, :min1])
       {:ok, {:follow_the_leader, :mag1}}
       iex> Robot.Command.parse("goto:abc:1", [])
-      {:error, ~s(goto: x cannot be "abc": a number is allowed, as in 2, -0.5 or 1.0e-3)}
+      {:error, ~s(goto: x: expected a number, as in 2, -0.5 or 1.0e-3, got "abc")}
       iex> Robot.Command.parse("goto:1", [])
-      {:error, "goto: y is missing: goto:X:Y or goto:X:Y:THETA is allowed"}
+      {:error, "goto: y is missing: expected goto:X:Y or goto:X:Y:THETA"}
       iex> {:error, line} = Robot.Command.parse("goot:1:2", [])
-      iex> line =~ ~r/^unknown command "goot": one of stop, move, goto, .* is allowed; did you mean goto\\?$/
+      iex> line =~ ~r/^expected one of stop, move, goto, .*, got "goot"; did you mean goto\\?$/
       true
   """
   @spec parse(term(), [atom()]) :: {:ok, t()} | {:error, String.t()}
@@ -108,12 +107,12 @@ defmodule Robot.Command do
   end
 
   def parse(text, _known) when is_binary(text),
-    do: {:error, "a command cannot be longer than #{@longest} bytes"}
+    do: {:error, "expected a command of at most #{@longest} bytes"}
 
-  def parse(_text, _known), do: {:error, "a command must be text, as in goto:2.0:1.0"}
+  def parse(_text, _known), do: {:error, "expected a command as text, as in goto:2.0:1.0"}
 
   defp command([""], _known),
-    do: {:error, "an empty command: one of #{Enum.join(@keywords, ", ")} is allowed"}
+    do: {:error, "an empty command: expected one of #{Enum.join(@keywords, ", ")}"}
 
   defp command([word | arguments], known) do
     keyword = word |> String.trim() |> String.downcase()
@@ -123,7 +122,7 @@ defmodule Robot.Command do
     case List.keyfind(@grammar, keyword, 0) do
       nil ->
         {:error,
-         "unknown command #{inspect(word)}: one of #{Enum.join(@keywords, ", ")} is allowed" <>
+         "expected one of #{Enum.join(@keywords, ", ")}, got #{inspect(word)}" <>
            Suggest.hint(keyword, @keywords)}
 
       {keyword, must, may} ->
@@ -141,11 +140,11 @@ defmodule Robot.Command do
 
     cond do
       count < length(must) ->
-        {:error, "#{keyword}: #{Enum.at(must, count)} is missing: #{usage(keyword)} is allowed"}
+        {:error, "#{keyword}: #{Enum.at(must, count)} is missing: expected #{usage(keyword)}"}
 
       count > length(names) ->
         extra = Enum.at(arguments, length(names))
-        {:error, "#{keyword}: #{inspect(extra)} is too much: #{usage(keyword)} is allowed"}
+        {:error, "#{keyword}: expected #{usage(keyword)}, got also #{inspect(extra)}"}
 
       true ->
         values(keyword, Enum.zip(names, arguments), known, [])
@@ -160,7 +159,7 @@ defmodule Robot.Command do
         values(keyword, rest, known, [value | values])
 
       {:error, allowed} ->
-        {:error, "#{keyword}: #{name} cannot be #{inspect(text)}: #{allowed}"}
+        {:error, "#{keyword}: #{name}: expected #{allowed}, got #{inspect(text)}"}
     end
   end
 

@@ -1,6 +1,6 @@
 defmodule Robot.Config do
   @moduledoc """
-  The options of one robot, checked once.
+  Holds the options of one robot, checked once.
 
     * `:id` - an atom, such as `:mag1`
     * `:profile` - its body, `%Hal.Profile{}`
@@ -106,13 +106,13 @@ defmodule Robot.Config do
       iex> config.start
       Hal.Pose.new(0, 0)
       iex> Robot.Config.new(id: "mag1", profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
-      {:error, "robot option id cannot be \\"mag1\\": an atom such as :mag1 is allowed"}
+      {:error, "robot option id: expected an atom such as :mag1, got \\"mag1\\""}
       iex> {:ok, config} = Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(),
       ...>   drive: {Some.Drive, []}, limits: [max_linear: 0.3])
       iex> config.profile.max_linear
       0.3
       iex> Robot.Config.new(id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []}, arm: :hand)
-      {:error, "robot option arm cannot be :hand: :auto or :manual is allowed"}
+      {:error, "robot option arm: expected :auto or :manual, got :hand"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
   def new(options) do
@@ -177,7 +177,7 @@ defmodule Robot.Config do
     do: {:error, "robot option save_pictures is for a robot with a camera"}
 
   defp check(%{colours: nil, camera: {_driver, _options}}),
-    do: {:error, "robot option colours cannot be nil: a robot with a camera must have colours"}
+    do: {:error, "robot option colours: expected those of the camera, got nil"}
 
   # A limit may not be higher than what the body can do.
   defp check(%{profile: profile, limits: limits} = config) do
@@ -189,7 +189,7 @@ defmodule Robot.Config do
         most = Map.fetch!(profile, name)
 
         {:error,
-         "robot option limits.#{name} cannot be #{value}: a #{profile.name} can do #{most} at most"}
+         "robot option limits.#{name}: expected at most #{most}, which a #{profile.name} can do, got #{value}"}
     end
   end
 
@@ -206,6 +206,6 @@ defmodule Robot.Config do
 
   defp round(_config, seconds) do
     {:error,
-     "robot option drive: its sonars take #{inspect(seconds)} s for a round; 0.0 to #{@longest_round_s} s are allowed"}
+     "robot option drive: expected 0.0 to #{@longest_round_s} s for a round of its sonars, got #{inspect(seconds)}"}
   end
 end

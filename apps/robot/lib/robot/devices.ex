@@ -1,6 +1,6 @@
 defmodule Robot.Devices do
   @moduledoc """
-  The supervisor of a robot's sensors and actuators, each of which is restarted alone:
+  Supervises a robot's sensors and actuators, each of which is restarted alone:
 
       Robot.Devices (one_for_one)
       |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)

@@ -1,7 +1,7 @@
 defmodule Robot.Fence do
   @moduledoc """
-  A fence that a robot must not cross, as a function: real robots that run together with simulated
-  ones follow leaders that do not know the real walls. Pure.
+  Computes a fence that a robot must not cross: real robots that run together with simulated ones follow leaders that do
+  not know the real walls. Pure.
 
   Corners are metres in the frame of the robot's own odometry, whose pose begins at the robot's
   start in the `map` frame and is moved only by odometry. Reports of other robots, and corrections

@@ -16,7 +16,6 @@ defmodule Robot.File do
   A person arms a real robot by hand: `arm: :manual` is the default here, but not in
   `Robot.Config`.
   """
-  alias Hal.Options.Wording
   alias Hal.{Pose, Profile}
   alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
   alias Robot.Navigation.MapFile
@@ -64,8 +63,6 @@ defmodule Robot.File do
           policies: keyword()
         }
 
-  @largest 65_536
-  @most_lines 40
   @config [
     :id,
     :profile,
@@ -95,9 +92,7 @@ defmodule Robot.File do
   """
   @spec load(Path.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
   def load(path, options \\ []) do
-    # Reading a pipe or a device might never end.
-    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
-         {:ok, text} <- File.read(path) do
+    with {:ok, text} <- Reader.text(path) do
       folder = Path.dirname(path)
 
       read = fn file, options ->
@@ -106,15 +101,6 @@ defmodule Robot.File do
 
       map = &MapFile.open(Path.expand(&1, folder))
       parse(text, Keyword.merge([file: path, colours: read, map: map], options))
-    else
-      {:ok, %File.Stat{type: :regular}} ->
-        {:error, ["#{path}: no robot file is larger than #{div(@largest, 1024)} kB"]}
-
-      {:ok, %File.Stat{type: type}} ->
-        {:error, ["#{path}: is a #{type}, where a file is needed"]}
-
-      {:error, reason} ->
-        {:error, ["#{path}: #{:file.format_error(reason)}"]}
     end
   end
 
@@ -125,7 +111,7 @@ defmodule Robot.File do
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
       {:error, [
-        "mag1.exs:1: arm: cannot be :manaul: :manual or :auto is allowed; did you mean :manual?"]}
+        "mag1.exs:1: arm: expected :manual or :auto, got :manaul; did you mean :manual?"]}
   """
   @spec parse(String.t(), keyword()) :: {:ok, t()} | {:error, [String.t(), ...]}
   def parse(text, options \\ []) do
@@ -147,8 +133,8 @@ defmodule Robot.File do
       {:ok, robot}
     else
       {:error, {line, text}} -> {:error, ["#{file}:#{line}: #{text}"]}
-      {:error, problems} -> {:error, lines(file, problems)}
-      problems -> {:error, lines(file, problems)}
+      {:error, problems} -> {:error, Reader.lines(problems, file)}
+      problems -> {:error, Reader.lines(problems, file)}
     end
   end
 
@@ -181,13 +167,4 @@ defmodule Robot.File do
       values |> Keyword.put(:profile, profile) |> Keyword.put_new(:start, Pose.new(0, 0))
     )
   end
-
-  # A person works through the first problems first; a count of the others is enough.
-  defp lines(file, problems) do
-    more = length(problems) - @most_lines
-    lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(file, &1))
-    if more > 0, do: lines ++ ["#{file}: and #{more} problems more"], else: lines
-  end
-
-  defp line(file, {line, path, text}), do: "#{file}:#{line}: #{Wording.path(path)}: #{text}"
 end

@@ -1,6 +1,6 @@
 defmodule Robot.Fleet do
   @moduledoc """
-  The robots of this node: one on a real machine, any number in a simulation.
+  Supervises the robots of this node: one on a real machine, any number in a simulation.
 
   A simulated robot whose supervisor ends is not restarted, and the others continue
   (`:temporary`). A real robot is `:permanent`: the fleet has a restart budget of zero, so it ends

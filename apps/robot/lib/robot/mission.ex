@@ -123,6 +123,15 @@ defmodule Robot.Mission do
   """
   @callback commands() :: [atom()]
 
+  @typedoc "What a robot does for its group in a phase, or has done when it reports a stage."
+  @type role :: :leads | :follows | :searches | :rests | :elects
+
+  @doc """
+  The roles of the mission's phases and stages, for those who judge whole runs. A search is one stage of all robots; one
+  that `:rests` has nothing to do. A mission without this callback has no such phases.
+  """
+  @callback roles() :: %{(phase_or_stage :: atom()) => role()}
+
   @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
   @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.raster()
 
@@ -134,6 +143,7 @@ defmodule Robot.Mission do
                       claims: 0,
                       stale: 1,
                       commands: 0,
+                      roles: 0,
                       map: 1
 
   @doc """
@@ -165,6 +175,15 @@ defmodule Robot.Mission do
   @spec names?(module(), command :: atom()) :: boolean()
   def names?(module, command),
     do: function_exported?(module, :commands, 0) and command in module.commands()
+
+  @doc "The roles of a mission's phases and stages (`c:roles/0`)."
+  @spec roles(module()) :: %{atom() => role()}
+  def roles(module),
+    do:
+      if(Code.ensure_loaded?(module) and function_exported?(module, :roles, 0),
+        do: module.roles(),
+        else: %{}
+      )
 
   @doc "Whether a mission says what its options are."
   @spec checks?(module()) :: boolean()

@@ -10,7 +10,7 @@ defmodule Robot.Names do
   `Registry` crashes if a connected node sends it something (`Hal.HardenedServer`). Readers use
   its table, without a message.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
 
   @type key :: {robot :: atom(), role :: term()}
@@ -120,11 +120,6 @@ defmodule Robot.Names do
     {:reply, :ok, monitors}
   end
 
-  def handle_call(_unknown, _from, monitors), do: HardenedServer.drop(monitors)
-
-  @impl GenServer
-  def handle_cast(_unknown, monitors), do: HardenedServer.drop(monitors)
-
   @impl GenServer
   def handle_info({:DOWN, ref, :process, pid, _reason}, monitors)
       when is_map_key(monitors, ref) do
@@ -132,8 +127,6 @@ defmodule Robot.Names do
     :ets.match_delete(__MODULE__, {key, pid, :_})
     {:noreply, monitors}
   end
-
-  def handle_info(_unknown, monitors), do: HardenedServer.drop(monitors)
 
   defp enter(monitors, key, pid, value) do
     :ets.insert(__MODULE__, {key, pid, value})

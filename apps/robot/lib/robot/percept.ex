@@ -1,7 +1,6 @@
 defmodule Robot.Percept do
   @moduledoc """
-  Everything that a robot perceives and estimates at one tick. Behaviours and missions read
-  nothing else.
+  Holds everything that a robot perceives and estimates at one tick. Behaviours and missions read nothing else.
 
   A reading that was older than its limit when the percept was taken is `nil` (`[]` for bumpers),
   so that no behaviour uses stale readings (`Robot.Percept.Snapshot`); `peers` have no such limit.

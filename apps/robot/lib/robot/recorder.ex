@@ -17,7 +17,7 @@ defmodule Robot.Recorder do
 
   Each file begins with a checkpoint of each role, and has one each minute.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Robot.Names
   alias Robot.Recorder.{Options, Output, Pictures, Queue}
@@ -140,11 +140,6 @@ defmodule Robot.Recorder do
     {:reply, closed(s), %{s | output: nil, failed: s.failed || "is closed"}}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({:entry, id, {role, _kind, _what, at_ms} = entry, now_ms}, s)
       when is_map_key(s.queues, id) and role in @roles and is_integer(at_ms) and
@@ -179,7 +174,6 @@ defmodule Robot.Recorder do
   end
 
   def handle_info({:EXIT, _other, _reason}, s), do: {:noreply, s}
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def terminate(_reason, s) do
@@ -212,7 +206,13 @@ defmodule Robot.Recorder do
         reduce: s do
       s ->
         offset_ms = s.robots[id].offset_ms || s.unix_ms
-        take(s, id, {role, :lost, lost, now_ms() + s.unix_ms - offset_ms}, now_ms())
+
+        take(
+          s,
+          id,
+          {role, :lost, lost, Hal.Clock.now_ms() + s.unix_ms - offset_ms},
+          Hal.Clock.now_ms()
+        )
     end
   end
 
@@ -268,13 +268,13 @@ defmodule Robot.Recorder do
 
   defp tell(s, what, about) do
     about = Map.merge(%{robots: s.ids, robot: hd(s.ids)}, about)
-    Event.execute([:robot, :recorder, what], %{at_ms: now_ms()}, about)
+    Event.execute([:robot, :recorder, what], %{at_ms: Hal.Clock.now_ms()}, about)
   end
 
   defp write(%{output: nil} = s), do: %{s | entries: [], count: 0, shots: []}
 
   defp write(s) do
-    ns = (now_ms() + s.unix_ms) * 1_000_000
+    ns = (Hal.Clock.now_ms() + s.unix_ms) * 1_000_000
 
     {entries, shots} = {Enum.reverse(s.entries), Enum.reverse(s.shots)}
 
@@ -292,19 +292,19 @@ defmodule Robot.Recorder do
   defp closed(%{output: nil, failed: line}), do: {:error, line}
   defp closed(%{output: output}), do: Output.close(output)
 
-  defp minute(s), do: if(now_ms() - s.asked_ms >= @checkpoint_ms, do: ask(s), else: s)
+  defp minute(s), do: if(Hal.Clock.now_ms() - s.asked_ms >= @checkpoint_ms, do: ask(s), else: s)
 
   defp ask(s) do
     Enum.each(s.queues, fn {_id, queue} -> Queue.ask(queue) end)
-    %{s | asked_ms: now_ms()}
+    %{s | asked_ms: Hal.Clock.now_ms()}
   end
 
   # Of a single file there is a part already, which is not overwritten.
   defp again(%{output: nil, failed: failed} = s) when failed != nil do
-    if s.file[:limit_bytes] != nil and now_ms() - s.tried_ms >= s.again_ms, do: open(s), else: s
+    if s.file[:limit_bytes] != nil and Hal.Clock.now_ms() - s.tried_ms >= s.again_ms,
+      do: open(s),
+      else: s
   end
 
   defp again(s), do: s
-
-  defp now_ms, do: System.monotonic_time(:millisecond)
 end

@@ -58,7 +58,7 @@ defmodule Robot.Recording do
   @doc "The robots from a message about them."
   @spec read_robots(binary()) :: {:ok, robots()} | {:error, line :: String.t()}
   def read_robots(bytes) do
-    case read(bytes) do
+    case read(bytes, @most_bytes) do
       {:ok, {:convoy_robots, @version, %{} = robots}} ->
         if Enum.all?(robots, &robot?/1), do: {:ok, robots}, else: strange()
 
@@ -82,7 +82,7 @@ defmodule Robot.Recording do
   @doc "The entries from a message with some."
   @spec read_trace(binary(), robots()) :: {:ok, [Replay.entry()]} | {:error, line :: String.t()}
   def read_trace(bytes, robots) do
-    with {:ok, entries} when is_list(entries) <- read(bytes),
+    with {:ok, entries} when is_list(entries) <- read(bytes, @most_bytes),
          {:ok, entries} <- entries(entries, robots, []) do
       {:ok, entries}
     else
@@ -104,10 +104,12 @@ defmodule Robot.Recording do
 
   defp write(term), do: :erlang.term_to_binary(term, [:deterministic, compressed: 6])
 
-  # Creates no atoms, and no more memory than a second can take.
-  defp read(<<131, 80, size::32, _deflated::binary>>) when size > @most_bytes, do: :error
+  @doc "A recorded term of at most so many bytes. Creates no atoms."
+  @spec read(binary(), most_bytes :: pos_integer()) :: {:ok, term()} | :error
+  def read(<<131, 80, size::32, _deflated::binary>>, most_bytes) when size > most_bytes,
+    do: :error
 
-  defp read(bytes) do
+  def read(bytes, _most_bytes) do
     {:ok, :erlang.binary_to_term(bytes, [:safe])}
   rescue
     ArgumentError -> :error

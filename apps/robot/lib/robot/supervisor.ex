@@ -1,6 +1,6 @@
 defmodule Robot.Supervisor do
   @moduledoc """
-  The supervisor of one robot.
+  Supervises one robot.
 
       Robot.Supervisor (rest_for_one)
       |-- Robot.Board                   the newest readings, the e-stop latch

@@ -261,7 +261,7 @@ defmodule Robot.Safety.FenceTest do
           {[{0, 0}, {4, 0}, {4, 3}, {2, 0}, {0, 3}], "do not cross"}
         ] do
       assert {:error, line} = Robot.Config.new(base ++ [fence: bad])
-      assert line =~ "option fence cannot be" and line =~ part and not (line =~ "\n")
+      assert line =~ "option fence: expected" and line =~ part and not (line =~ "\n")
     end
   end
 end

@@ -171,19 +171,24 @@ defmodule Robot.SupervisorTest do
     rolls()
     [executive, pilot] = parts(id, @above)
     goal = fn goal -> Executive.goal(id, :t, goal) end
-    assert {:error, "NoSuchModule is not a behaviour" <> _} = goal.({NoSuchModule, []})
-    assert {:error, "Robot.Safety.Gate is not a behaviour" <> _} = goal.({Gate, []})
 
-    assert {:error, "Robot.Behaviour.Goto: goto option x is missing: a number" <> _} =
+    assert {:error, "expected a behaviour, a module with new/1 and tick/2, got NoSuchModule" <> _} =
+             goal.({NoSuchModule, []})
+
+    assert {:error,
+            "expected a behaviour, a module with new/1 and tick/2, got Robot.Safety.Gate" <> _} =
+             goal.({Gate, []})
+
+    assert {:error, "Robot.Behaviour.Goto: goto option x is missing: expected a number" <> _} =
              goal.({Robot.Behaviour.Goto, y: 1})
 
-    assert {:error, "Robot.Behaviour.Goto: [1] are not options" <> _} =
+    assert {:error, "Robot.Behaviour.Goto: expected options [key: value], got [1]" <> _} =
              goal.({Robot.Behaviour.Goto, [1]})
 
-    assert {:error, "Robot.Behaviour.Follow: follow option target cannot be %Hal.Pose{" <> _} =
+    assert {:error, "Robot.Behaviour.Follow: follow option target: expected " <> _} =
              goal.({Robot.Behaviour.Follow, target: %Hal.Pose{x: :far, y: 0.0, heading: nil}})
 
-    assert {:error, ":roll is not a goal" <> _} = goal.(:roll)
+    assert {:error, "expected a goal {module, options} or nil, got :roll" <> _} = goal.(:roll)
     roll = {Acts.Roll, twist: Twist.zero()}
     assert Executive.goal(:fall_nobody, :t, roll) |> elem(1) =~ "no robot :fall_nobody runs"
     rolls()
@@ -191,7 +196,7 @@ defmodule Robot.SupervisorTest do
 
     listen(id)
     bad = {:do, :ready, [{:goal, :t, {NoSuchModule, []}}]}
-    assert inspect(catch_exit(Pilot.command(id, bad))) =~ "NoSuchModule is not a behaviour"
+    assert inspect(catch_exit(Pilot.command(id, bad))) =~ "got NoSuchModule"
     assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
     assert Names.whereis(id, :executive) == executive
   end

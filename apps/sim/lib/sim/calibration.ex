@@ -1,7 +1,7 @@
 defmodule Sim.Calibration do
   @moduledoc """
-  A calibration of odometry in a simulated hall, in lockstep: one robot drives the courses that a real one
-  would, by the same controller and reflexes, and its true pose is what a person would have measured. Pure.
+  Calibrates odometry in a simulated hall, in lockstep: one robot drives the courses that a real one would, by the same
+  controller and reflexes, and its true pose is what a person would have measured. Pure.
 
   Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (errors
   of the odometry, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of a

@@ -1,8 +1,8 @@
 defmodule Sim.Compute do
   @moduledoc """
-  The heavy work of a world: distance fields, sonar rays, camera pictures. It runs in C if the
-  library was built, otherwise in Elixir; both give the same bits, because every operation is an
-  addition, multiplication, division or square root of doubles in the same order.
+  Does the heavy work of a world: distance fields, sonar rays, camera pictures. It runs in C if the library was built,
+  otherwise in Elixir; both give the same bits, because every operation is an addition, multiplication, division or
+  square root of doubles in the same order.
   """
   alias Sim.Compute
   alias Sim.Compute.Reference

@@ -1,8 +1,8 @@
 defmodule Sim.Emulator do
   @moduledoc """
-  An emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what
-  the device commands, and the device gets what the body senses. At the other end, the symbolic
-  link, a driver finds it like a real device.
+  Runs an emulated device (`Sim.Emulator.Core`) on a pseudo-terminal, with a body: the body does what the device
+  commands, and the device gets what the body senses. At the other end, the symbolic link, a driver finds it like a real
+  device.
 
   | option | meaning |
   |---|---|
@@ -36,7 +36,7 @@ defmodule Sim.Emulator do
     options = Keyword.validate!(options, [:core, :link, body: nil, wire: []])
     {module, core_options} = options[:core]
 
-    with {:ok, core} <- module.new(core_options, now()),
+    with {:ok, core} <- module.new(core_options, Hal.Clock.now_ms()),
          {:ok, to_core} <- Wire.new([way: 0] ++ options[:wire]),
          {:ok, from_core} <- Wire.new([way: 1] ++ options[:wire]) do
       GenServer.start_link(
@@ -113,7 +113,7 @@ defmodule Sim.Emulator do
   def handle_call({:freeze, frozen?}, _from, s), do: {:reply, :ok, pump(%{s | frozen?: frozen?})}
 
   def handle_call({:change, :restart, []}, _from, s),
-    do: {:reply, :ok, pump(%{s | core: s.module.restart(s.core, now())})}
+    do: {:reply, :ok, pump(%{s | core: s.module.restart(s.core, Hal.Clock.now_ms())})}
 
   def handle_call({:apply, function, arguments}, _from, s),
     do: {:reply, :ok, pump(%{s | core: apply(s.module, function, [s.core | arguments])})}
@@ -139,9 +139,14 @@ defmodule Sim.Emulator do
 
   def handle_info(message, %{line: line} = s) do
     case line && Serial.handle(line, message) do
-      {:data, bytes} -> {:noreply, pump(%{s | to_core: Wire.put(s.to_core, bytes, now())})}
-      {:error, reason} -> {:noreply, s |> close() |> failed(reason)}
-      _not_the_line -> {:noreply, felt(s, message)}
+      {:data, bytes} ->
+        {:noreply, pump(%{s | to_core: Wire.put(s.to_core, bytes, Hal.Clock.now_ms())})}
+
+      {:error, reason} ->
+        {:noreply, s |> close() |> failed(reason)}
+
+      _not_the_line ->
+        {:noreply, felt(s, message)}
     end
   end
 
@@ -167,7 +172,10 @@ defmodule Sim.Emulator do
 
   defp failed(s, reason) do
     about = %{link: s.link, reason: reason}
-    if reason != s.reason, do: Event.execute([:sim, :emulator, :line], %{at_ms: now()}, about)
+
+    if reason != s.reason,
+      do: Event.execute([:sim, :emulator, :line], %{at_ms: Hal.Clock.now_ms()}, about)
+
     Process.send_after(self(), :open, @retry_ms)
     %{s | reason: reason}
   end
@@ -195,7 +203,7 @@ defmodule Sim.Emulator do
 
       {:ok, readings, body} ->
         s = %{s | body: {:body, body}}
-        at_ms = now()
+        at_ms = Hal.Clock.now_ms()
         feel = fn reading, core -> s.module.feel(core, reading, at_ms) end
         if s.frozen?, do: s, else: pump(%{s | core: Enum.reduce(readings, s.core, feel)})
 
@@ -207,12 +215,12 @@ defmodule Sim.Emulator do
 
   # Does everything that is due: bytes in, bytes out, the body, and the next timer.
   defp pump(%{frozen?: true} = s) do
-    {_unheard, to_core} = Wire.take(s.to_core, now())
+    {_unheard, to_core} = Wire.take(s.to_core, Hal.Clock.now_ms())
     schedule(%{s | to_core: to_core}, [Wire.next_ms(to_core)])
   end
 
   defp pump(s) do
-    at_ms = now()
+    at_ms = Hal.Clock.now_ms()
     {heard, to_core} = Wire.take(s.to_core, at_ms)
     {said, wishes, core} = s.core |> s.module.hear(heard, at_ms) |> s.module.run(at_ms)
     {sent, from_core} = s.from_core |> Wire.put(said, at_ms) |> Wire.take(at_ms)
@@ -257,6 +265,4 @@ defmodule Sim.Emulator do
         }
     end
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,8 +1,7 @@
 defmodule Sim.Fleet do
   @moduledoc """
-  A world and n robots in real time, so that `Swarm` commands them like any other, and any part of
-  them may be killed: on this node (`Sim.Fleet.Local`), or each in a process of the operating system of
-  its own (`Sim.Fleet.Nodes`).
+  Runs a world and n robots in real time, so that `Swarm` commands them like any other, and any part of them may be
+  killed: on this node (`Sim.Fleet.Local`), or each in a process of the operating system of its own (`Sim.Fleet.Nodes`).
 
   This process plays the script, keeps the run log, and answers viewers; its backend decides where
   world and robots run (`Sim.Fleet.Backend`).
@@ -128,7 +127,7 @@ defmodule Sim.Fleet do
       backend: backend,
       epoch_ms: epoch_ms,
       script: Script.new(options.moves, options.kills),
-      run_log: RunLog.new(),
+      run_log: RunLog.new(elem(setup.mission, 0)),
       said: [],
       ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)

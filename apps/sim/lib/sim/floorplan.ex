@@ -1,7 +1,7 @@
 defmodule Sim.Floorplan do
   @moduledoc """
-  A floor plan of square cells, wall or free. The origin is at the centre, x right, y up, in
-  metres; everything outside the plan is wall. Pure.
+  Holds a floor plan of square cells, wall or free. The origin is at the centre, x right, y up, in metres; everything
+  outside the plan is wall. Pure.
 
   `field` has one byte per cell, rows from the lowest y: the distance to the nearest wall in
   cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
@@ -33,7 +33,7 @@ defmodule Sim.Floorplan do
       iex> Sim.Floorplan.size(map)
       {18.0, 18.0}
       iex> {:error, line} = Sim.Floorplan.open("mars", 6)
-      iex> line =~ "unknown map mars: hall, hospital, arena, "
+      iex> line =~ "map: expected hall, hospital, arena, "
       true
   """
   @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}

@@ -1,7 +1,6 @@
 defmodule Sim.Node do
   @moduledoc """
-  The main program of an operating-system process that runs one robot, or the world, of a
-  `Sim.Fleet.Nodes`.
+  Runs one robot, or the world, of a `Sim.Fleet.Nodes`, as the main program of an operating-system process.
 
   The first line of its standard input is its whole configuration (`Sim.Fleet.Nodes.Config`), so that
   nothing of it is on a command line. With it the process becomes a node, starts its part, and

@@ -1,7 +1,7 @@
 defmodule Sim.Noise do
   @moduledoc """
-  Random numbers without a generator: a draw is a hash of its purpose (seed, robot, step, index),
-  so it is the same in any order, language or process. Pure.
+  Draws random numbers without a generator: a draw is a hash of its purpose (seed, robot, step, index), so it is the
+  same in any order, language or process. Pure.
 
   The factors of the hash have 27 bits, so that Elixir never leaves its small integers.
   """

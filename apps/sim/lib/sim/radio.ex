@@ -1,7 +1,6 @@
 defmodule Sim.Radio do
   @moduledoc """
-  A radio that delays, loses and duplicates messages, and can be partitioned, all from a seed.
-  Pure.
+  Simulates a radio that delays, loses and duplicates messages, and can be partitioned, all from a seed. Pure.
 
   The fate of a message depends on its number alone, so the same sends give the same deliveries,
   in the order of their time and then of their number. Every copy has its own draw: one message to
@@ -40,7 +39,7 @@ defmodule Sim.Radio do
   and greatest delay, `:cut` the pairs that cannot hear each other. Wrong options raise `ArgumentError`.
 
       iex> Sim.Radio.new(seed: 1, loss: 2.0)
-      ** (ArgumentError) radio option loss cannot be 2.0: a number from 0 to 1 is allowed
+      ** (ArgumentError) radio option loss: expected a number from 0 to 1, got 2.0
   """
   @spec new(keyword()) :: t()
   def new(options) do

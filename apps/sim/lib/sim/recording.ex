@@ -82,12 +82,5 @@ defmodule Sim.Recording do
     end
   end
 
-  # Creates no atoms, and no more memory than a recording can take.
-  defp read(<<131, 80, size::32, _deflated::binary>>) when size > @most_bytes, do: :error
-
-  defp read(bytes) do
-    {:ok, :erlang.binary_to_term(bytes, [:safe])}
-  rescue
-    ArgumentError -> :error
-  end
+  defp read(bytes), do: Robot.Recording.read(bytes, @most_bytes)
 end

@@ -1,7 +1,7 @@
 defmodule Sim.Scenario do
   @moduledoc """
-  A scenario as data: a world and its robots, a script of events, and what is expected of the run.
-  Pure. `Sim.Scenario.Runner` runs it in lockstep, `Sim.Scenario.File` reads and writes it as text.
+  Describes a scenario as data: a world and its robots, a script of events, and what is expected of the run. Pure.
+  `Sim.Scenario.Runner` runs it in lockstep, `Sim.Scenario.File` reads and writes it as text.
   """
   alias Hal.Options
   alias Hal.Options.{Suggest, Type}
@@ -34,7 +34,7 @@ defmodule Sim.Scenario do
       iex> {scenario.options, scenario.script, scenario.expect}
       {[robots: [:mag1, :min1], seed: 3], [{5.0, {:kill, :leader}}], [{:no_collision}]}
       iex> Sim.Scenario.new(options: [robots: 2], script: [{500, {:reset}}])
-      {:error, "scenario option script.1 cannot be {500.0, {:reset}}: the run ends after 120 s"}
+      {:error, "scenario option script.1: expected times within the run, got {500.0, {:reset}}: the run ends after 120 s"}
       iex> Sim.Scenario.new(expect: [{:formd, by_s: 60}])
       ...> |> elem(1) |> String.split("; ") |> List.last()
       "did you mean formed?"
@@ -105,13 +105,15 @@ defmodule Sim.Scenario do
   defp late(script, duration_s) do
     for {{at_s, _event} = entry, n} <- Enum.with_index(script, 1),
         at_s > duration_s,
-        do: {["script", "#{n}"], "cannot be #{inspect(entry)}: #{ends(duration_s)}"}
+        do:
+          {["script", "#{n}"],
+           "expected times within the run, got #{inspect(entry)}: #{ends(duration_s)}"}
   end
 
   defp expected(expectations, robots, duration_s) do
     for {expectation, n} <- Enum.with_index(expectations, 1),
         words <- strange(expectation, robots) ++ never(expectation, duration_s),
-        do: {["expect", "#{n}"], "cannot be #{inspect(expectation)}: #{words}"}
+        do: {["expect", "#{n}"], "expected what can hold, got #{inspect(expectation)}: #{words}"}
   end
 
   defp strange(expectation, robots) do

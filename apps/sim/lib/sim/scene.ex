@@ -1,6 +1,6 @@
 defmodule Sim.Scene do
   @moduledoc """
-  A snapshot of a whole fleet, seen from outside, which viewers get ten times a second.
+  Shows a whole fleet from outside in a snapshot, which viewers get ten times a second.
 
   The lockstep run and the live fleet both produce it, so the terminal, the page and the picture
   can draw either. Poses are the true ones, in metres and radians, in the frame `map`; `at_ms`

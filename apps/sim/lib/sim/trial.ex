@@ -1,7 +1,7 @@
 defmodule Sim.Trial do
   @moduledoc """
-  A whole mission as a function: members, radio and world folded in lockstep, as fast as possible,
-  identical to the byte for the same seed. No process, no clock.
+  Plays a whole mission as a function: members, radio and world folded in lockstep, as fast as possible, identical to
+  the byte for the same seed. No process, no clock.
 
   Every 50 ms, in this order: radio, sense, think (every 100 ms, with a new picture), reflex, act.
   `step/1` is 100 ms. `Sim.Trial.Script` schedules interventions (`Sim.Trial.Event`), which
@@ -84,7 +84,7 @@ defmodule Sim.Trial do
         ),
       members: members,
       script: Script.new(options.moves, options.kills, options.script),
-      run_log: RunLog.new(),
+      run_log: RunLog.new(elem(setup.mission, 0)),
       colours: World.colours()
     }
   end

@@ -1,8 +1,7 @@
 defmodule Sim.Trig do
   @moduledoc """
-  Sine and cosine from additions and multiplications only, so that a run is identical to the bit
-  on every machine, however its C library rounds. Accurate to a few 1e-16 for angles of a few
-  turns. Pure.
+  Computes sine and cosine from additions and multiplications only, so that a run is identical to the bit on every
+  machine, however its C library rounds. Accurate to a few 1e-16 for angles of a few turns. Pure.
   """
 
   @two_over_pi 0.6366197723675814

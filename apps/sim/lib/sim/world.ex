@@ -1,6 +1,6 @@
 defmodule Sim.World do
   @moduledoc """
-  A world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
+  Models a world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
 
   `step/2` acts, moves and senses. Every sensor is fresh after every step: all sonars fire at once
   and do not disturb each other. A body is a disc of the profile's radius; it stops at contact and
@@ -244,9 +244,8 @@ defmodule Sim.World do
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
-  @doc "Everything upright that robot `id` can see."
-  @spec poles(t(), id()) :: [CameraFrustum.pole()]
-  def poles(%__MODULE__{} = world, id) do
+  # Everything upright that robot `id` can see.
+  defp poles(%__MODULE__{} = world, id) do
     robots = for other <- world.order, other != id, do: pole(world.robots[other])
     landmark_pole(world) ++ robots
   end

@@ -88,7 +88,7 @@ defmodule Robot.MissionCaseTest do
       MissionCase.problems(:patorl)
     end
 
-    assert_raise ArgumentError, ~r/mission case option seconds cannot be 1/, fn ->
+    assert_raise ArgumentError, ~r/mission case option seconds: expected .*, got 1/, fn ->
       MissionCase.problems(:patrol, seconds: 1)
     end
   end

@@ -211,14 +211,15 @@ defmodule Sim.FleetTest do
     stop(fleet)
 
     for {mission, nodes?, word} <- [
-          {{NoSuchModule, []}, false, "NoSuchModule is not a Robot.Mission"},
+          {{NoSuchModule, []}, false,
+           "a Robot.Mission (init/2 and handle/2), got {NoSuchModule, []}"},
           {{Turn, [1]}, false, "options"},
           {5, false, "true, false, a name or"},
-          {{Turn, rate: 0.3}, true, "with nodes"}
+          {{Turn, rate: 0.3}, true, "processes of their own"}
         ] do
       options = %{robots: [:mag76], map: "hall", mission: mission, nodes: nodes?}
       assert {:error, line} = Fleet.start_link(options)
-      assert line =~ "mission cannot be" and line =~ word
+      assert line =~ "mission: expected" and line =~ word
     end
   end
 

@@ -126,7 +126,7 @@ defmodule Sim.FlockTest do
   end
 
   test "a wrong option is one line" do
-    assert {:error, "flock option spacing cannot be 0.1: a number from 0.9 to 5 m is allowed"} =
+    assert {:error, "flock option spacing: expected a number from 0.9 to 5 m, got 0.1"} =
              Swarm.Missions.choose({:flock, spacing: 0.1}, 4)
 
     assert {:error, line} = Swarm.Missions.Text.read("flock:sped=1", 4)

@@ -113,7 +113,7 @@ defmodule Sim.PatrolTest do
     assert {:error, line} = Trial.new(%{mission: :patorl})
     assert line =~ "did you mean :patrol?"
     assert {:error, line} = Trial.new(%{mission: {:patrol, period: 1}})
-    assert line =~ "period cannot be 1: a number from 10 to 3600 s is allowed"
+    assert line =~ "period: expected a number from 10 to 3600 s, got 1"
   end
 
   test "a text command starts it in the middle of a run of another mission" do

@@ -278,7 +278,7 @@ defmodule Sim.WorldTest do
 
   test "wrong options are named" do
     assert_raise ArgumentError,
-                 ~r/option noise cannot be :loud: :off, :default or :slip is allowed/,
+                 ~r/option noise: expected :off, :default or :slip, got :loud/,
                  fn -> world([], noise: :loud) end
 
     assert_raise ArgumentError, ~r/there is a wall/, fn ->

@@ -1,8 +1,7 @@
 defmodule Swarm.Blackboard do
   @moduledoc """
-  What the robots of the fleet publish about themselves, and leave for each other
-  (`Swarm.Blackboard.Hints`), on every node: `Swarm.Blackboard.State` in one process per node,
-  which all processes can read without asking it.
+  Shares what the robots of the fleet publish about themselves, and leave for each other (`Swarm.Blackboard.Hints`), on
+  every node: `Swarm.Blackboard.State` in one process per node, which all processes can read without asking it.
 
       Swarm.Blackboard.put(:mag1, :door, %{open: true})        # on the node of mag1
       Swarm.Blackboard.get(:mag1, :door, 2_000)                # on any node
@@ -136,6 +135,5 @@ defmodule Swarm.Blackboard do
 
   defp call(board, request), do: Nonblocking.call(board, request, "the blackboard of this node")
 
-  defp age(at_ms), do: max(now() - at_ms, 0)
-  defp now, do: System.monotonic_time(:millisecond)
+  defp age(at_ms), do: max(Hal.Clock.now_ms() - at_ms, 0)
 end

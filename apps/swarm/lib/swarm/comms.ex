@@ -86,12 +86,9 @@ defmodule Swarm.Comms do
   """
   @spec say(robot :: atom(), to, Message.t() | Letter.t() | Claim.t()) :: [atom()]
         when to: atom() | [atom()] | :all
-  def say(robot, to, %Letter{} = letter), do: say(robot, to, Message.new(robot, :mission, letter))
-  def say(robot, to, %Claim{} = claim), do: say(robot, to, Message.new(robot, :claim, claim))
-
   def say(robot, to, message) do
     ids = List.delete(addressed(to), robot)
-    GenServer.cast(Names.via(robot, :comms), {:say, ids, message})
+    GenServer.cast(Names.via(robot, :comms), {:say, ids, Message.of(robot, message)})
     ids
   end
 

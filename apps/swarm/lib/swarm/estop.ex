@@ -1,9 +1,8 @@
 defmodule Swarm.EStop do
   @moduledoc """
-  A robot's emergency stop: a companion beside its comms process, with high priority and a mailbox
-  of its own. Everything that stops the robot arrives here (`:estop`, `:reset`, `:stop` and
-  `:disarm` from people, calls of `Swarm.EStop.Broadcaster`) and goes to the gate at once, even if
-  the comms process is flooded, hangs or is dead.
+  Stops a robot in an emergency: a companion beside its comms process, with high priority and a mailbox of its own.
+  Everything that stops the robot arrives here (`:estop`, `:reset`, `:stop` and `:disarm` from people, calls of
+  `Swarm.EStop.Broadcaster`) and goes to the gate at once, even if the comms process is flooded, hangs or is dead.
 
   It alone owns the state of the emergency stop (`Swarm.EStop.State`), and publishes it on the
   board under `:estop`, for all others to read. The only other copy is the gate's latch, which

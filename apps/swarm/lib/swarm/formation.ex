@@ -1,6 +1,6 @@
 defmodule Swarm.Formation do
   @moduledoc """
-  The places of robots in a formation, relative to the leader. Pure; metres and radians.
+  Computes the places of robots in a formation, relative to the leader. Pure; metres and radians.
 
   A slot is a pose in the leader's frame (+x ahead, +y left); the leader has slot 0 and is not in
   the list. Slots have the leader's heading, except in a `:circle`, where all face its centre.
@@ -72,9 +72,9 @@ defmodule Swarm.Formation do
       iex> Swarm.Formation.new(:triangle, side: 3.0, robots: 6)
       {:ok, {:triangle, 1.5}}
       iex> Swarm.Formation.new(:column, spacing: 0.1)
-      {:error, "column option spacing cannot be 0.1: a number from 0.8 to 5.0 m is allowed"}
+      {:error, "column option spacing: expected a number from 0.8 to 5.0 m, got 0.1"}
       iex> {:error, line} = Swarm.Formation.new("hart", [])
-      iex> line =~ ~s(formation cannot be "hart": :column, :line, :wedge)
+      iex> line =~ ~s(formation: expected :column, :line, :wedge)
       true
   """
   @spec new(kind() | String.t() | term(), keyword()) :: {:ok, t()} | {:error, String.t()}
@@ -84,8 +84,8 @@ defmodule Swarm.Formation do
          {:ok, spacing} <- Type.read(@spacing, spacing(kind, options)) do
       {:ok, {kind, spacing}}
     else
-      {:kind, {:error, [{[], text}]}} -> {:error, "formation #{text}"}
-      {:error, [{[], text}]} -> {:error, "spacing #{text}"}
+      {:kind, {:error, [{[], text}]}} -> {:error, "formation: #{text}"}
+      {:error, [{[], text}]} -> {:error, "spacing: #{text}"}
       {:error, line} -> {:error, line}
     end
   end

@@ -1,8 +1,8 @@
 defmodule Swarm.Member do
   @moduledoc """
-  One robot of a fleet as one pure function: the peers it hears, its mission, its controller and its
-  gate, composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and
-  `Swarm.Comms` run the same parts in the same order, so both do the same on the same input.
+  Runs one robot of a fleet as one pure function: the peers it hears, its mission, its controller and its gate,
+  composed. `Sim.Trial` folds it in lockstep; live, the processes of `Robot.Supervisor` and `Swarm.Comms` run the same
+  parts in the same order, so both do the same on the same input.
 
   | input | from |
   |---|---|
@@ -18,12 +18,11 @@ defmodule Swarm.Member do
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mission, Percept}
   alias Robot.Control.Controller
-  alias Robot.Mission.{Claim, Letter, Manual, Runner}
+  alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Reflex
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
-  import Robot.Mission, only: [is_order: 1]
 
   # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
   defguardp is_alone(command)
@@ -184,15 +183,8 @@ defmodule Swarm.Member do
     heard(%{member | receiver: receiver}, heard, at_ms)
   end
 
-  @doc "The robot's estimate of its pose, or `nil`."
-  @spec pose(t()) :: Pose.t() | nil
-  def pose(member) do
-    percept = Controller.percept(member.controller)
-    percept && percept.pose
-  end
-
   @doc """
-  The distance in metres from that pose within which the robot is in 95 of 100 cases
+  The distance in metres from its estimated pose within which the robot is in 95 of 100 cases
   (`Robot.Percept`), or `nil`.
   """
   @spec uncertainty(t()) :: float() | nil
@@ -292,25 +284,19 @@ defmodule Swarm.Member do
   end
 
   defp carry_out(effects, member) do
-    {out, member} = Enum.flat_map_reduce(effects, member, &carry_out_one/2)
+    {out, member} =
+      effects |> Enum.flat_map(&Runner.actions/1) |> Enum.flat_map_reduce(member, &act/2)
+
     {member, out}
   end
 
-  defp carry_out_one(order, member) when is_order(order) do
+  defp act({:obey, order}, member) do
     {controller, pan} = Controller.obey(member.controller, order)
     {look(pan), %{member | controller: controller}}
   end
 
-  # The runner has it.
-  defp carry_out_one({:claim, _claim}, member), do: {[], member}
-
-  defp carry_out_one({:send, to, %Letter{} = letter}, member),
-    do: {[{:send, to, Message.new(member.id, :mission, letter)}], member}
-
-  defp carry_out_one({:send, to, %Claim{} = claim}, member),
-    do: {[{:send, to, Message.new(member.id, :claim, claim)}], member}
-
-  defp carry_out_one(effect, member), do: {[effect], member}
+  defp act({:send, to, body}, member), do: {[{:send, to, Message.of(member.id, body)}], member}
+  defp act({:stage, _name, _facts} = stage, member), do: {[stage], member}
 
   defp look(pan), do: for(pan <- List.wrap(pan), do: {:look, pan, 0.0})
 

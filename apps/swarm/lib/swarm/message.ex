@@ -1,6 +1,6 @@
 defmodule Swarm.Message do
   @moduledoc """
-  A message between robots: its sender, its kind, and a body whose shape depends on the kind.
+  Carries a message between robots: its sender, its kind, and a body whose shape depends on the kind.
 
   Whatever comes from outside passes `check/1` once, at the receiver: a malformed message is an
   error with a reason, to be dropped and counted, and nothing behind the receiver needs to check a
@@ -56,6 +56,12 @@ defmodule Swarm.Message do
           | t()
         ) :: t()
   def new(from, kind, body), do: %__MODULE__{from: from, kind: kind, body: body}
+
+  @doc "What a robot's mission sends, as a message of this robot."
+  @spec of(atom(), t() | Robot.Mission.Letter.t() | Robot.Mission.Claim.t()) :: t()
+  def of(from, %Robot.Mission.Letter{} = letter), do: new(from, :mission, letter)
+  def of(from, %Robot.Mission.Claim{} = claim), do: new(from, :claim, claim)
+  def of(_from, %__MODULE__{} = message), do: message
 
   @doc """
   Another robot's message as this robot passes it on; `:error` if it has been passed on often

@@ -1,7 +1,7 @@
 defmodule Swarm.Missions do
   @moduledoc """
-  The missions for groups that this node knows, by name. They live in apps above this
-  one, so the configuration lists them:
+  Lists the missions for groups that this node knows, by name. They live in apps above this one, so the configuration
+  lists them:
 
       config :swarm, missions: [landmark: Missions.Landmark, patrol: Missions.Patrol]
 
@@ -69,7 +69,7 @@ defmodule Swarm.Missions do
          {:ok, options} <- options(module, options, robots) do
       {:ok, {module, options}}
     else
-      {:keys, false} -> {:error, "mission #{said(name)} options #{not_keys(options)}"}
+      {:keys, false} -> {:error, "mission #{said(name)} options: #{not_keys(options)}"}
       error -> error
     end
   end
@@ -77,8 +77,7 @@ defmodule Swarm.Missions do
   def choose(name, robots) when is_atom(name) or is_binary(name), do: choose({name, []}, robots)
 
   def choose(other, _robots) do
-    {:error,
-     "mission cannot be #{Wording.show(other)}: a name, or {name, [key: value, …]}, is allowed"}
+    {:error, "mission: expected a name, or {name, [key: value, …]}, got #{Wording.show(other)}"}
   end
 
   defp not_keys(options) do
@@ -209,8 +208,8 @@ defmodule Swarm.Missions do
 
   defp allowed([]), do: "no mission is configured (config :swarm, missions: …)"
 
-  defp allowed([name]), do: "#{said(name)} is allowed"
-  defp allowed(names), do: "one of #{Enum.map_join(names, ", ", &said/1)} is allowed"
+  defp allowed([name]), do: "expected #{said(name)}"
+  defp allowed(names), do: "expected one of #{Enum.map_join(names, ", ", &said/1)}"
 
   defp said(name), do: if(is_binary(name), do: name, else: inspect(name))
 end

@@ -31,11 +31,11 @@ defmodule Swarm.Order do
       iex> Swarm.Order.check({:goto, 1, 2.0, nil})
       {:ok, {:goto, 1.0, 2.0, nil}}
       iex> Swarm.Order.check({:goto, :far, 2.0, nil})
-      {:error, "goto cannot take :far: a number from -10000 to 10000 is allowed"}
+      {:error, "goto: expected a number from -10000 to 10000, got :far"}
       iex> Swarm.Order.check({:move, 99, 0})
-      {:error, "move cannot take 99: a number from -10 to 10 is allowed"}
+      {:error, "move: expected a number from -10 to 10, got 99"}
       iex> Swarm.Order.check({:move, 0.5, 0, -1})
-      {:error, "move cannot take -1 seconds: a number from 0 to 600 is allowed"}
+      {:error, "move: expected a number of seconds from 0 to 600, got -1"}
   """
   @spec check(term()) :: {:ok, t()} | {:error, line :: String.t()}
   def check({:goto, x, y, nil}), do: numbers(:goto, [x, y], @farthest, &{:goto, &1, &2, nil})
@@ -58,7 +58,7 @@ defmodule Swarm.Order do
       do: {:ok, {:square, side * 1.0}},
       else:
         {:error,
-         "square cannot take #{brief(side)}: a side from #{@least_side} to #{@most_side} m is allowed"}
+         "square: expected a side from #{@least_side} to #{@most_side} m, got #{brief(side)}"}
   end
 
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
@@ -83,7 +83,7 @@ defmodule Swarm.Order do
   def check(command) do
     if known?(command),
       do: {:ok, command},
-      else: {:error, "#{brief(command)} is not a command; those of Robot.Command are allowed"}
+      else: {:error, "expected a command of Robot.Command, got #{brief(command)}"}
   end
 
   defp known?(word) when word in [:stop, :lead, :start, :ping, :wander, :rest], do: true
@@ -105,7 +105,7 @@ defmodule Swarm.Order do
   defp within(word, wrong, least, most),
     do:
       {:error,
-       "#{word} cannot take #{brief(wrong)} seconds: a number from #{least} to #{most} is allowed"}
+       "#{word}: expected a number of seconds from #{least} to #{most}, got #{brief(wrong)}"}
 
   # Elixir has neither NaN nor infinities, so they cannot occur.
   defp numbers(word, list, most, build) do
@@ -114,8 +114,7 @@ defmodule Swarm.Order do
         {:ok, apply(build, Enum.map(list, &(&1 * 1.0)))}
 
       [wrong | _] ->
-        {:error,
-         "#{word} cannot take #{inspect(wrong)}: a number from -#{most} to #{most} is allowed"}
+        {:error, "#{word}: expected a number from -#{most} to #{most}, got #{inspect(wrong)}"}
     end
   end
 

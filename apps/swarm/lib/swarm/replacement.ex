@@ -1,7 +1,7 @@
 defmodule Swarm.Replacement do
   @moduledoc """
-  Another mission, or new code of one, for robots that are under way (`Swarm.replace/2`): they stand, change, and go on;
-  what ends in its first 10 s goes back by itself.
+  Gives robots that are under way another mission, or new code of one (`Swarm.replace/2`): they stand, change, and go
+  on; what ends in its first 10 s goes back by itself.
 
   | part | what it does |
   |---|---|
@@ -50,7 +50,7 @@ defmodule Swarm.Replacement do
       with {:ok, module, code} <- Replacement.Code.read(source),
            do: {:ok, {module, options}, code}
     else
-      {:error, "options cannot be #{Wording.show(options)}: [key: value, …] is allowed"}
+      {:error, "options: expected [key: value, …], got #{Wording.show(options)}"}
     end
   end
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Status do
   @moduledoc """
-  A robot's status, for people. In `iex` it prints as one line:
+  Describes a robot's status, for people. In `iex` it prints as one line:
 
       #mag1 follow (1.20, -0.35, 90 deg) ±0.12 m, 0.31 m/s by follow, view 7, hears 4 but not min2, age 40 ms
 
@@ -23,10 +23,8 @@ defmodule Swarm.Status do
   that follows (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how
   long ago, ms).
 
-  A follower that does not get to its place is `BLOCKED by the landmark`, by another robot, by something
-  unknown or by `no way` (`Missions.Landmark.Blocker`).
-
-  What its mission says in words of its own (`says`) stands there as it is.
+  A robot that does not get to its place is `BLOCKED by …`, as its mission says (`blocked_by`); what that says in words of
+  its own (`says`) stands there as it is.
 
   A robot whose mission was replaced says which it was given, by whom, and why it went back (`replaced`; `Swarm.replace/2`).
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Supervisor do
   @moduledoc """
-  The processes of which a node has one each, however many robots run on it.
+  Supervises the processes of which a node has one each, however many robots run on it.
 
       Swarm.Supervisor (no restarts to give)
       |-- Robot.Names                   the processes of this node's robots

@@ -262,6 +262,6 @@ defmodule Swarm.ArmingTest do
     assert {:error, _} = Swarm.disarm([:nobody])
     assert {:error, _} = Swarm.acknowledge({1, 2})
     id = robot(:arm_sense)
-    assert {:error, "arm: \"now\" is too much" <> _} = Swarm.tell(id, "arm:now")
+    assert {:error, "arm: expected arm, got also \"now\"" <> _} = Swarm.tell(id, "arm:now")
   end
 end

@@ -65,7 +65,7 @@ defmodule Swarm.CameraTest do
 
     assert {:error, ":x is not a reference from subscribe"} = Camera.next(id, :x)
     robot(:seeing3, camera: {Hal.Camera.FFmpeg, source: "/dev/video77"}, colours: colours())
-    assert {:error, "rate cannot be 0: " <> _} = Camera.subscribe(:seeing3, rate: 0)
+    assert {:error, "rate: expected " <> _} = Camera.subscribe(:seeing3, rate: 0)
     assert {:error, "the camera is offline (:enoent)"} = Camera.snapshot(:seeing3)
   end
 

@@ -173,7 +173,10 @@ defmodule Swarm.CommsTest do
     assert Swarm.ask(id, :stop) == :ok
     assert %{rejected: %{not_a_message: dropped}} = Swarm.status(id)
     assert dropped > 50
-    assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~ "goto cannot take :far"
+
+    assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~
+             "goto: expected a number from -10000 to 10000, got :far"
+
     assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is not a command"
     assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
     assert parts(id, [:comms, :pilot, :executive, :gate]) == parts

@@ -170,13 +170,13 @@ defmodule Swarm.ReplacementTest do
              Swarm.replace(id, {StandMission, spacing: 1})
 
     assert {:error, "no robot :repl_nobody; " <> _} = Swarm.replace(:repl_nobody, StandMission)
-    assert {:error, "mission cannot be 7: " <> _} = Swarm.replace(id, 7)
-    assert {:error, "code cannot be 7: " <> _} = Swarm.replace(id, {:code, 7})
+    assert {:error, "mission: expected " <> _} = Swarm.replace(id, 7)
+    assert {:error, "code: expected " <> _} = Swarm.replace(id, {:code, 7})
 
     assert {:error, ":nothing has no file with its code here"} =
              Swarm.replace(id, {:code, :nothing})
 
-    assert {:error, "options cannot be 7: " <> _} = Swarm.replace(id, {:code, StandMission, 7})
+    assert {:error, "options: expected " <> _} = Swarm.replace(id, {:code, StandMission, 7})
 
     assert {:error, "none of these modules is a Robot.Mission"} =
              Swarm.replace(

@@ -1,8 +1,8 @@
 defmodule Vision.Backend do
   @moduledoc """
-  A way to find the regions of a frame. `Vision.Backend.Reference` defines the answer, in plain
-  Elixir; `Vision.Backend.Native` gives the same answer, faster. `Vision.Backend.Nx` and
-  `Vision.Backend.Evision` give it where their packages are (docs/packages.md).
+  Defines a way to find the regions of a frame. `Vision.Backend.Reference` defines the answer, in plain Elixir;
+  `Vision.Backend.Native` gives the same answer, faster. `Vision.Backend.Nx` and `Vision.Backend.Evision` give it where
+  their packages are (docs/packages.md).
 
   A backend of your own may give this answer in yet another way, or find something else, such as
   lamps. The option `:backend` of `Vision.Colours` selects it. The colours then name what it

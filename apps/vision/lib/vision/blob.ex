@@ -1,6 +1,6 @@
 defmodule Vision.Blob do
   @moduledoc """
-  One coloured region of a frame, after CMVision and Player's blobfinder.
+  Describes one coloured region of a frame, after CMVision and Player's blobfinder.
 
   Pixels are counted from the top left; `left` and `top` are the first pixel inside, `right` and
   `bottom` the last one **inside**. `x`, `y` are the centroid, with pixel centres at whole

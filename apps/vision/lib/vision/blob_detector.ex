@@ -1,7 +1,7 @@
 defmodule Vision.BlobDetector do
   @moduledoc """
-  The process that finds blobs in frames. It works on the newest frame only: it drops older ones
-  that wait in its mailbox, so it does not lag behind its camera.
+  Finds blobs in frames, in a process of its own. It works on the newest frame only: it drops older ones that wait in
+  its mailbox, so it does not lag behind its camera.
 
   Options:
 
@@ -25,7 +25,7 @@ defmodule Vision.BlobDetector do
   A camera's device passes its frames on by the sink `{Vision.BlobDetector, :frame, [detector]}`,
   a pan-tilt unit's device its readings by `{Vision.BlobDetector, :aim, [detector]}`.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Frame, HardenedServer, Ptz}
   alias Vision.{Colours, Detections}
 
@@ -95,14 +95,8 @@ defmodule Vision.BlobDetector do
     end
   end
 
-  def handle_cast(_unknown, state), do: HardenedServer.drop(state)
-
   @impl GenServer
   def handle_call(:status, _from, state), do: {:reply, state.counts, state}
-  def handle_call(_unknown, _from, state), do: HardenedServer.drop(state)
-
-  @impl GenServer
-  def handle_info(_unknown, state), do: HardenedServer.drop(state)
 
   # Frames that have come in the meantime are further down in the mailbox.
   defp newest(frame, dropped) do
@@ -153,10 +147,10 @@ defmodule Vision.BlobDetector do
       ])
 
     unless is_boolean(options[:ptz]),
-      do: raise(ArgumentError, "blob detector option :ptz must be true or false")
+      do: raise(ArgumentError, "blob detector option ptz: expected true or false")
 
     unless match?(%Colours{}, options[:colours]),
-      do: raise(ArgumentError, "blob detector option :colours must be a %Vision.Colours{}")
+      do: raise(ArgumentError, "blob detector option colours: expected a %Vision.Colours{}")
 
     case options[:sink] do
       {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) ->
@@ -165,7 +159,7 @@ defmodule Vision.BlobDetector do
       other ->
         raise(
           ArgumentError,
-          "blob detector option :sink must be {m, f, a}, not #{inspect(other)}"
+          "blob detector option sink: expected {m, f, a}, got #{inspect(other)}"
         )
     end
   end

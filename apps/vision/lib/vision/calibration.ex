@@ -14,7 +14,7 @@ defmodule Vision.Calibration do
      remaining pixels.
   4. **Margins** are added: 3 values for U and V, 6 for Y, and the effect of a change of light,
      which makes red, green and blue grow or shrink alike, and with them Y, and the distances of U
-     and V from 128. The tolerance of light is the requested one, or the widest of `tolerances/0`
+     and V from 128. The tolerance of light is the requested one, or the widest of those tried
      with which the picture shows the same blobs as without (`Vision.Calibration.Match.same?/2`).
   """
   alias Hal.Frame
@@ -36,10 +36,6 @@ defmodule Vision.Calibration do
           share: float(),
           match: Match.t()
         }
-
-  @doc "The tolerances of light that are tried, widest first."
-  @spec tolerances() :: [float(), ...]
-  def tolerances, do: @tolerances
 
   @doc """
   The class `name` from these places (`Vision.Calibration.Sample`) of frames of one size; it is

@@ -1,6 +1,6 @@
 defmodule Vision.Colours do
   @moduledoc """
-  The colours to look for: up to 32 classes, each a box in YUV, read from a CMVision colour file.
+  Holds the colours to look for: up to 32 classes, each a box in YUV, read from a CMVision colour file.
 
       [Colors]
       (255,255,0) 0.500000 10 YellowLandmark
@@ -114,7 +114,7 @@ defmodule Vision.Colours do
       iex> Vision.Colours.mask(colours, {100, 100, 200})
       1
       iex> Vision.Colours.new([])
-      {:error, "no colours: 1 to 32 are allowed"}
+      {:error, "expected 1 to 32 colours, got none"}
   """
   @spec new([map()], keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(classes, options \\ []) do
@@ -168,9 +168,9 @@ defmodule Vision.Colours do
   defp bit({lowest, highest}, value) when value >= lowest and value <= highest, do: 1
   defp bit(_limits, _value), do: 0
 
-  defp check_count(0), do: {:error, "no colours: 1 to #{@most} are allowed"}
+  defp check_count(0), do: {:error, "expected 1 to #{@most} colours, got none"}
   defp check_count(n) when n <= @most, do: :ok
-  defp check_count(n), do: {:error, "#{n} colours: 1 to #{@most} are allowed"}
+  defp check_count(n), do: {:error, "expected 1 to #{@most} colours, got #{n}"}
 
   defp check_names(names) do
     case names -- Enum.uniq(names) do
@@ -182,7 +182,7 @@ defmodule Vision.Colours do
   defp check_area(_option, area, least) when area in least..@largest_area//1, do: :ok
 
   defp check_area(option, area, least),
-    do: {:error, "#{option} cannot be #{inspect(area)}: whole numbers from #{least} are allowed"}
+    do: {:error, "#{option}: expected whole numbers from #{least}, got #{inspect(area)}"}
 
   defp check_backend(nil), do: :ok
 
@@ -190,7 +190,7 @@ defmodule Vision.Colours do
     if is_atom(backend) and Code.ensure_loaded?(backend) and
          function_exported?(backend, :regions, 2),
        do: :ok,
-       else: {:error, "backend cannot be #{inspect(backend)}: a Vision.Backend is allowed"}
+       else: {:error, "backend: expected a Vision.Backend, got #{inspect(backend)}"}
   end
 
   defp check_distances(distances, names) do
@@ -200,8 +200,7 @@ defmodule Vision.Colours do
           {:error, "distance for #{name}, but the colours are #{Enum.join(names, ", ")}"}
 
         not (is_number(constant) and constant > 0) ->
-          {:error,
-           "distance for #{name} cannot be #{inspect(constant)}: a number above 0 is allowed"}
+          {:error, "distance for #{name}: expected a number above 0, got #{inspect(constant)}"}
 
         true ->
           nil

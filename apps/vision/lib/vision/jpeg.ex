@@ -1,8 +1,7 @@
 defmodule Vision.Jpeg do
   @moduledoc """
-  The arguments with which ffmpeg encodes raw frames from its input as JPEG, one picture for each,
-  and the parser of its output: a stream of parts, each with its length. Pure;
-  `Vision.Jpeg.Encoder` runs it.
+  Builds the arguments with which ffmpeg encodes raw frames from its input as JPEG, one picture for each, and parses its
+  output: a stream of parts, each with its length. Pure; `Vision.Jpeg.Encoder` runs it.
 
   A picture keeps the chroma resolution of its frame, and the full range, which JPEG is made for.
   """

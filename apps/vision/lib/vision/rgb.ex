@@ -1,6 +1,6 @@
 defmodule Vision.Rgb do
   @moduledoc """
-  RGB to YUV as CMVision's driver does it: full range, whole numbers, rounded down.
+  Converts RGB to YUV as CMVision's driver does it: full range, whole numbers, rounded down.
 
   Two neighbours in a row, the even pixel and the odd one to its right, share their chroma. So an
   edge between them mixes it, and a thin object may lose a column of pixels.

@@ -1,8 +1,8 @@
 defmodule Vision.Runs do
   @moduledoc """
-  The regions of a picture of masks, for a backend that computes the masks of all pixels and leaves
-  the rest. A run is a longest piece of a row whose pixels have the same mask, not 0. A run that
-  touches runs of the same mask in the row above joins their regions into one.
+  Finds the regions of a picture of masks, for a backend that computes the masks of all pixels and leaves the rest. A
+  run is a longest piece of a row whose pixels have the same mask, not 0. A run that touches runs of the same mask in
+  the row above joins their regions into one.
 
   The time grows with the runs, not with the pixels: empty rows cost almost nothing, and a frame of
   speckle much.

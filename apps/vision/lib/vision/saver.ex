@@ -22,7 +22,7 @@ defmodule Vision.Saver do
   picture when the last one is written. A full disk does not make it delete more than its limits
   require.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Vision.Saver.{Options, Retention}
   alias Vision.View
@@ -78,11 +78,6 @@ defmodule Vision.Saver do
     {files, bytes} = if s.retention, do: Retention.size(s.retention), else: {0, 0}
     {:reply, %{files: files, bytes: bytes, saved: s.saved, why: s.why}, s}
   end
-
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:picture, ref, picture}, %{ref: ref} = s) do
@@ -178,7 +173,10 @@ defmodule Vision.Saver do
   defp failed(s, reason) do
     line = "no pictures are saved in #{s.folder}: #{explain(reason)}"
     about = %{folder: s.folder, reason: reason, line: line}
-    if line != s.why, do: Event.execute([:vision, :saver, :failed], %{at_ms: now()}, about)
+
+    if line != s.why,
+      do: Event.execute([:vision, :saver, :failed], %{at_ms: Hal.Clock.now_ms()}, about)
+
     Process.send_after(self(), :again, s.rest_ms)
     %{s | why: line, rest_ms: min(2 * s.rest_ms, @longest_rest_ms)}
   end
@@ -186,13 +184,11 @@ defmodule Vision.Saver do
   defp healed(%{why: nil} = s), do: s
 
   defp healed(s) do
-    Event.execute([:vision, :saver, :healed], %{at_ms: now()}, %{folder: s.folder})
+    Event.execute([:vision, :saver, :healed], %{at_ms: Hal.Clock.now_ms()}, %{folder: s.folder})
     %{s | why: nil, rest_ms: @rest_ms}
   end
 
   defp explain(line) when is_binary(line), do: line
   defp explain(:too_large), do: "one picture is larger than all that may be kept"
   defp explain(reason), do: to_string(:file.format_error(reason))
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -162,11 +162,10 @@ defmodule Vision.View do
         {:ok, round(1000 / rate)}
 
       [rate: rate] ->
-        {:error,
-         "rate cannot be #{shown(rate)}: pictures a second are allowed, #{lowest} to #{highest}"}
+        {:error, "rate: expected #{lowest} to #{highest} pictures a second, got #{shown(rate)}"}
 
       other ->
-        {:error, "#{shown(other)} is not an option of a viewer; it has rate: pictures a second"}
+        {:error, "viewer: expected rate: pictures a second, got #{shown(other)}"}
     end
   end
 

@@ -183,17 +183,17 @@ defmodule Vision.BlobDetectorTest do
   end
 
   test "wrong options are named", %{colours: colours} do
-    assert_raise ArgumentError, ~r/:colours/, fn ->
+    assert_raise ArgumentError, ~r/option colours: /, fn ->
       BlobDetector.start_link(sink: {Kernel, :send, []})
     end
 
-    assert_raise ArgumentError, ~r/:sink/, fn ->
+    assert_raise ArgumentError, ~r/option sink: /, fn ->
       BlobDetector.start_link(colours: colours, sink: self())
     end
 
     assert_raise ArgumentError, ~r/:size/, fn -> BlobDetector.start_link(size: 3) end
 
-    assert_raise ArgumentError, ~r/:ptz/, fn ->
+    assert_raise ArgumentError, ~r/option ptz: /, fn ->
       BlobDetector.start_link(colours: colours, sink: {Kernel, :send, []}, ptz: 3)
     end
   end

@@ -97,22 +97,22 @@ defmodule Vision.BlobsTest do
   test "wrong command lines are told in one line" do
     for {words, said} <- [
           {~w(--colours c), "no source"},
-          {~w(a b --colours c), "2 sources (a, b): one is allowed"},
+          {~w(a b --colours c), "expected one source, got 2: a, b"},
           {~w(a), "--colours FILE is missing"},
           {~w(a --colours), "--colours needs a value"},
-          {~w(a --colours c --every x), "--every cannot be \"x\": a whole number is allowed"},
-          {~w(a --colours c --every 0), "--every cannot be 0"},
-          {~w(a --colours c --frames -3), "--frames cannot be -3"},
+          {~w(a --colours c --every x), "--every: expected a whole number, got \"x\""},
+          {~w(a --colours c --every 0), "--every: expected whole numbers from 1 to 1000000000, got 0"},
+          {~w(a --colours c --frames -3), "--frames: expected whole numbers from 1 to 1000000000, got -3"},
           {~w(a --colours c --pictures p.png),
            "unknown option --pictures; did you mean --picture?"},
           {~w(a --colours c --zzz), "unknown option --zzz; known are --colours"},
-          {~w(a --colours c --picture p.gif), "--picture cannot be \"p.gif\""},
+          {~w(a --colours c --picture p.gif), "--picture: expected names ending in .png or .jpg, got \"p.gif\""},
           {~w(a --colours c --picture /no/p.png), "--picture /no/p.png: no folder /no"},
-          {~w(a --colours c --json lib), "--json cannot be \"lib\": it is a folder"},
+          {~w(a --colours c --json lib), "--json: expected a file, got \"lib\", a folder"},
           {~w(a --colours c --backend Vision.Backend.Nativ),
-           "--backend cannot be \"Vision.Backend.Nativ\": a module of this build"},
-          {~w(a --colours c --distance Red), "--distance cannot be \"Red\": NAME=K"},
-          {~w(a --colours c --distance Red=-1), "--distance cannot be \"Red=-1\""}
+           "--backend: expected a module of this build"},
+          {~w(a --colours c --distance Red), "--distance: expected NAME=K"},
+          {~w(a --colours c --distance Red=-1), "--distance: expected NAME=K with K above 0, as in Yellow=0.0651, got \"Red=-1\""}
         ] do
       assert {:error, line} = Options.parse(words)
       assert String.starts_with?(line, said), line

@@ -195,7 +195,7 @@ defmodule Vision.CalibrationTest do
     end
 
     assert {:error, line} = Edit.put(text, %{class | name: "two words"})
-    assert line =~ "one word of up to 60 letters is allowed"
+    assert line =~ "expected one word of up to 60 letters"
     assert {:error, _line} = Edit.put("[Colors]\nnothing", class)
   end
 
@@ -224,7 +224,7 @@ defmodule Vision.CalibrationTest do
     }
 
     assert {:error, line} = Edit.put(text, class)
-    assert line =~ "33 colours: 1 to 32 are allowed"
+    assert line =~ "expected 1 to 32 colours, got 33"
   end
 
   describe "photographs" do

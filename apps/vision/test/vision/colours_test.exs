@@ -55,7 +55,7 @@ defmodule Vision.ColoursTest do
   test "32 classes are read, the last has the highest bit; 33 are not" do
     {:ok, colours} = many(32) |> Colours.parse()
     assert Colours.mask(colours, {31, 1, 1}) == 0x80000000
-    assert error(many(33)) == "f: 33 colours: 1 to 32 are allowed"
+    assert error(many(33)) == "f: expected 1 to 32 colours, got 33"
   end
 
   test "a missing blank line is told as such" do
@@ -125,9 +125,12 @@ defmodule Vision.ColoursTest do
 
   test "limits out of range, the wrong way round or broken are named" do
     for {limits, said} <- [
-          {"(-5:240,60:90,130:145)", "f:8: threshold Y -5:240 is out of range"},
-          {"(170:240,60:300,130:145)", "f:8: threshold U 60:300 is out of range"},
-          {"(170:240,60:90,145:130)", "f:8: threshold V 145:130 is out of range"},
+          {"(-5:240,60:90,130:145)",
+           "f:8: threshold Y: expected 0 to 255, the lower number first, got -5:240"},
+          {"(170:240,60:300,130:145)",
+           "f:8: threshold U: expected 0 to 255, the lower number first, got 60:300"},
+          {"(170:240,60:90,145:130)",
+           "f:8: threshold V: expected 0 to 255, the lower number first, got 145:130"},
           {"(170:abc,60:90,130:145)",
            "f:8: \"(170:abc,60:90,130:145)\" is not of the form (Ylo:Yhi"}
         ] do
@@ -148,8 +151,8 @@ defmodule Vision.ColoursTest do
     assert error("") =~ "f: is empty"
     assert error("hello\nworld\n") =~ "f: no colours found"
     assert error(<<0, 255, 17, 3>>) == "f: not a text file"
-    assert error(@good <> "\n[Colors]\n") == "f:11: a second [Colors] section: one is allowed"
-    assert error(String.duplicate("x", 300)) == "f:1: 300 bytes long, 255 are allowed"
+    assert error(@good <> "\n[Colors]\n") == "f:11: expected one [Colors] section, got a second"
+    assert error(String.duplicate("x", 300)) == "f:1: expected at most 255 bytes, got 300"
 
     assert error(String.replace(@good, "(255,255,0)", "(256,255,0)")) =~
              "f:3: the colour YellowLandmark"
@@ -165,16 +168,16 @@ defmodule Vision.ColoursTest do
             "colour file: distance for Blue, but the colours are YellowLandmark, RedRobot"} =
              Colours.parse(@good, distance: %{"Blue" => 1.0})
 
-    assert {:error, "colour file: distance for RedRobot cannot be 0:" <> _} =
+    assert {:error, "colour file: distance for RedRobot: expected " <> _} =
              Colours.parse(@good, distance: %{"RedRobot" => 0})
 
-    assert {:error, "colour file: min_area cannot be 0: whole numbers from 1 are allowed"} =
+    assert {:error, "colour file: min_area: expected whole numbers from 1, got 0"} =
              Colours.parse(@good, min_area: 0)
 
     assert {:error, _} = Colours.parse(@good, max_area: -1)
     assert {:error, _} = Colours.parse(@good, min_area: 2.5)
 
-    assert {:error, "colour file: backend cannot be Hal.Pose: a Vision.Backend is allowed"} =
+    assert {:error, "colour file: backend: expected a Vision.Backend, got Hal.Pose"} =
              Colours.parse(@good, backend: Hal.Pose)
   end
 

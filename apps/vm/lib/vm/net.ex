@@ -1,8 +1,8 @@
 defmodule Vm.Net do
   @moduledoc """
-  A network of our own on this machine: a namespace with two bridges (the switch), and one for
-  each robot, with a cable to the switch and no route but that to its network. Nothing of it is seen outside, and it goes with whoever
-  made it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
+  Builds a network of our own on this machine: a namespace with two bridges (the switch), and one for each robot, with a
+  cable to the switch and no route but that to its network. Nothing of it is seen outside, and it goes with whoever made
+  it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
 
       net = Vm.Net.create([:mag1, :mag2, :mag3], folder)
       Vm.Net.split(net, [[:mag1, :mag2], [:mag3]])

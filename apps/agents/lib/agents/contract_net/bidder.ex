@@ -1,6 +1,6 @@
 defmodule Agents.ContractNet.Bidder do
   @moduledoc """
-  A bidder for tasks, which carries out one at a time. Pure; time is passed in, in milliseconds.
+  Bids for tasks, and carries out one at a time. Pure; time is passed in, in milliseconds.
 
       free --bids--> locked --accepted--> working --finished, cancelled--> free
         ^               |

@@ -1,8 +1,8 @@
 defmodule Agents.ContractNet.Bidding do
   @moduledoc """
-  The service of a robot that bids for tasks and carries them out: an `Agents.Responder` whose
-  argument is `{module, argument}`, the module a `Agents.ContractNet`. The work runs in a process
-  of its own, so that the robot keeps answering; cancelling a task ends it.
+  Serves a robot that bids for tasks and carries them out: an `Agents.Responder` whose argument is `{module, argument}`,
+  the module a `Agents.ContractNet`. The work runs in a process of its own, so that the robot keeps answering;
+  cancelling a task ends it.
   """
   alias Agents.ContractNet.Bidder
   alias Agents.{Conversation, Envelope}
@@ -23,13 +23,13 @@ defmodule Agents.ContractNet.Bidding do
     key = key(envelope, round)
 
     {bidder, {performative, content}} =
-      Bidder.announced(s.bidder, key, task, cost, left_ms, now())
+      Bidder.announced(s.bidder, key, task, cost, left_ms, Hal.Clock.now_ms())
 
     {{performative, {round, content}}, %{s | bidder: bidder}}
   end
 
   def handle(%{performative: :accept, content: round} = envelope, s) do
-    {bidder, answer} = Bidder.accepted(s.bidder, key(envelope, round), now())
+    {bidder, answer} = Bidder.accepted(s.bidder, key(envelope, round), Hal.Clock.now_ms())
     s = %{s | bidder: bidder}
 
     case answer do
@@ -85,5 +85,4 @@ defmodule Agents.ContractNet.Bidding do
   end
 
   defp key(envelope, round), do: {envelope.conversation, round}
-  defp now, do: System.monotonic_time(:millisecond)
 end

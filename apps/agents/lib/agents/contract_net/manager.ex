@@ -90,7 +90,7 @@ defmodule Agents.ContractNet.Manager do
 
     for {option, value} <- options, not (Wire.ms?(value) and value > 0) do
       raise ArgumentError,
-            "#{option} cannot be #{inspect(value, limit: 5)}: a whole number above 0, ms up to a day"
+            "#{option}: expected a whole number above 0, ms up to a day, got #{inspect(value, limit: 5)}"
     end
 
     options

@@ -1,5 +1,5 @@
 defmodule Agents.PubSub.Local do
-  @moduledoc "Events of one node on a `Registry` (`Agents.PubSub`). Needs only Elixir."
+  @moduledoc "Publishes events on one node by a `Registry` (`Agents.PubSub`). Needs only Elixir."
   @behaviour Agents.PubSub
 
   @impl Agents.PubSub

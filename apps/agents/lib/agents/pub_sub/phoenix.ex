@@ -1,9 +1,8 @@
 if Code.ensure_loaded?(Phoenix.PubSub) do
   defmodule Agents.PubSub.Phoenix do
     @moduledoc """
-    Events of one node on `Phoenix.PubSub` (`Agents.PubSub`), for programs that use it anyway.
-    Nothing is sent to other nodes, because a slow connection between robots must not delay
-    anybody.
+    Publishes events on one node by `Phoenix.PubSub` (`Agents.PubSub`), for programs that use it anyway. Nothing is sent
+    to other nodes, because a slow connection between robots must not delay anybody.
     """
     @behaviour Agents.PubSub
 

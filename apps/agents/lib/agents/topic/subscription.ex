@@ -1,7 +1,7 @@
 defmodule Agents.Topic.Subscription do
   @moduledoc false
   # Joins the topic's group for its owner, who gets one envelope for each that it asks for.
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Agents.{Envelope, Mailbox, Template}
   alias Swarm.Directory
@@ -36,14 +36,11 @@ defmodule Agents.Topic.Subscription do
     {:reply, Map.put(counts, :waiting, Mailbox.size(s.mailbox)), s}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:more, owner}, %{owner: owner} = s),
     do: {:noreply, hand_over(%{s | asked: s.asked + 1})}
 
   def handle_cast({:unsubscribe, owner}, %{owner: owner} = s), do: {:stop, :normal, s}
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:DOWN, _monitor, :process, owner, _reason}, %{owner: owner} = s),

@@ -59,7 +59,7 @@ defmodule Agents.ContractNet.MachinesTest do
     {m, _} = start([:a])
     assert {%{outcome: {:error, :nobody}}, []} = Manager.gone(m, :a, 5)
 
-    assert_raise ArgumentError, ~r/rounds cannot be 0/, fn -> start([:a], rounds: 0) end
+    assert_raise ArgumentError, ~r/rounds: expected .*, got 0/, fn -> start([:a], rounds: 0) end
     assert_raise ArgumentError, fn -> start([:a], speed: 1) end
   end
 

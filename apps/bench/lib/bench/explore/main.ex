@@ -1,7 +1,7 @@
 defmodule Bench.Explore.Main do
   @moduledoc "Runs the command `mix bench explore`: reads its options, measures, prints the table."
-  alias Bench.{Command, Explore}
-  alias Console.Cli.{Format, Output, Parse, Progress}
+  alias Bench.{Command, Explore, Table}
+  alias Console.Cli.{Format, Parse}
 
   @maps ~w(hall openplan offices)
   @fleets [1, 4]
@@ -12,38 +12,22 @@ defmodule Bench.Explore.Main do
   def run(arguments), do: Command.run(arguments, "explore", table(), &measure/1)
 
   defp measure(given) do
-    output = Output.to(:stderr)
     maps = given["maps"] || @maps
     limit_s = given["duration"] || @limit_s
 
     jobs =
       for map <- maps, robots <- @fleets, seed <- given["seeds"] || 1..5, do: {map, robots, seed}
 
-    results =
-      jobs
-      |> Task.async_stream(&{&1, one(&1, limit_s)}, max_concurrency: 2, timeout: :infinity)
-      |> Enum.with_index(1)
-      |> Enum.map(fn {{:ok, {{map, robots, seed}, _} = result}, done} ->
-        note = "#{Format.count(robots, "robot")} in #{map}, seed #{seed}"
-        line = Progress.line(done, length(jobs), note, (output.columns || 80) - 1)
-        Output.progress(output, line)
-        result
-      end)
+    run = fn {map, robots, seed} -> Explore.run(map, robots, seed, limit_s) end
 
-    Output.finish(output)
+    named = fn {map, robots, seed} ->
+      "#{Format.count(robots, "robot")} in #{map}, seed #{seed}"
+    end
+
+    results = Command.each(jobs, run, named)
     measured = for {_job, {:ok, measured}} <- results, do: measured
     IO.write(draw(maps, measured))
-
-    case for {{map, robots, seed}, {:error, line}} <- results,
-             do: "#{map}, #{robots} robots, seed #{seed}: #{line}" do
-      [] -> :ok
-      lines -> {:error, lines}
-    end
-  end
-
-  defp one({map, robots, seed}, limit_s) do
-    Sim.Trial.Memory.prepare()
-    Explore.run(map, robots, seed, limit_s)
+    Command.failed(for {job, {:error, line}} <- results, do: "#{named.(job)}: #{line}")
   end
 
   @heads [
@@ -68,8 +52,7 @@ defmodule Bench.Explore.Main do
           some != [],
           do: row(map, robots, some, Enum.filter(measured, &(&1.map == map and &1.robots == 1)))
 
-    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows]
-    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+    Table.markdown(@heads, rows)
   end
 
   defp row(map, robots, some, alone) do
@@ -107,8 +90,7 @@ defmodule Bench.Explore.Main do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one run each (1-5)"},
       Command.maps(@maps),
-      {"duration", "S", &Parse.whole(&1, 1..100_000), "simulated seconds at most (#{@limit_s})"},
-      {"help", nil, nil, "this text"}
+      {"duration", "S", &Parse.whole(&1, 1..100_000), "simulated seconds at most (#{@limit_s})"}
     ]
   end
 end

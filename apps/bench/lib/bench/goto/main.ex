@@ -1,7 +1,7 @@
 defmodule Bench.Goto.Main do
   @moduledoc "Runs the command `mix bench goto`: reads its options, measures, prints the table."
   alias Bench.{Command, Goto, Table}
-  alias Console.Cli.{Format, Output, Parse, Progress}
+  alias Console.Cli.{Format, Parse}
 
   @maps ~w(offices hospital clinic lab cave ring doorway openplan)
 
@@ -10,34 +10,14 @@ defmodule Bench.Goto.Main do
   def run(arguments), do: Command.run(arguments, "goto", table(), &measure/1)
 
   defp measure(given) do
-    output = Output.to(:stderr)
     maps = given["maps"] || @maps
     jobs = for map <- maps, seed <- given["seeds"] || 1..50, do: {map, seed}
 
-    results =
-      jobs
-      |> Task.async_stream(&{&1, draw(&1)}, max_concurrency: 2, timeout: :infinity)
-      |> Enum.with_index(1)
-      |> Enum.map(fn {{:ok, {{map, seed}, _} = result}, done} ->
-        note = "#{map}, seed #{seed}"
-        line = Progress.line(done, length(jobs), note, (output.columns || 80) - 1)
-        Output.progress(output, line)
-        result
-      end)
-
-    Output.finish(output)
+    named = fn {map, seed} -> "#{map}, seed #{seed}" end
+    results = Command.each(jobs, fn {map, seed} -> Goto.run(map, seed) end, named)
     measured = for {_job, {:ok, measured}} <- results, do: measured
     IO.write(draw_table(maps, measured) <> failures(measured))
-
-    case for {{map, seed}, {:error, line}} <- results, do: "#{map}, seed #{seed}: #{line}" do
-      [] -> :ok
-      lines -> {:error, lines}
-    end
-  end
-
-  defp draw({map, seed}) do
-    Sim.Trial.Memory.prepare()
-    Goto.run(map, seed)
+    Command.failed(for {job, {:error, line}} <- results, do: "#{named.(job)}: #{line}")
   end
 
   @heads [
@@ -61,8 +41,7 @@ defmodule Bench.Goto.Main do
 
     all = if length(rows) > 1, do: [row("all", measured)], else: []
 
-    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows ++ all]
-    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+    Table.markdown(@heads, rows ++ all)
   end
 
   defp row(map, some) do
@@ -104,8 +83,7 @@ defmodule Bench.Goto.Main do
   defp table do
     [
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds, one draw each (1-50)"},
-      Command.maps(@maps),
-      {"help", nil, nil, "this text"}
+      Command.maps(@maps)
     ]
   end
 end

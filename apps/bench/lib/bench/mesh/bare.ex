@@ -1,7 +1,7 @@
 defmodule Bench.Mesh.Bare do
   @moduledoc """
-  The same measurements on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that
-  its nodes load little of Elixir.
+  Measures the same on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that its nodes load little of
+  Elixir.
   """
   alias Bench.Mesh.Watch
 

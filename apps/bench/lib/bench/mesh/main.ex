@@ -26,8 +26,7 @@ defmodule Bench.Mesh.Main do
 
   defp words(about) do
     "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
-      "figure is the largest.\nLoad of the machine (1 min): #{about.load_before || "?"} before, " <>
-      "#{about.load_after || "?"} after; #{about.schedulers} processors."
+      "figure is the largest.\n#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
   end
 
   defp table do
@@ -37,8 +36,7 @@ defmodule Bench.Mesh.Main do
        "and this many robots in one node; 0 for none (100)"},
       {"only", "NAME,NAME", &Mesh.choose/1, "which cases (all)"},
       {"share", "PERCENT", &Parse.whole(&1, 1..1_000), "how much of the usual repetitions (100)"},
-      {"json", "FILE", &{:ok, &1}, "write the figures there too"},
-      {"help", nil, nil, "this text"}
+      {"json", "FILE", &{:ok, &1}, "write the figures there too"}
     ]
   end
 

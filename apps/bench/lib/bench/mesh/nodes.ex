@@ -1,6 +1,6 @@
 defmodule Bench.Mesh.Nodes do
   @moduledoc """
-  Nodes to measure, each a `Vm` of its own: this process is not part of the measurement.
+  Starts the nodes to measure, each a `Vm` of its own: this process is not part of the measurement.
   """
   alias Bench.Mesh.{Bare, Convoy, Watch}
   alias Mesh.Secret

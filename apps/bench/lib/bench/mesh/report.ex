@@ -27,10 +27,7 @@ defmodule Bench.Mesh.Report do
 
   @doc "The table."
   @spec draw([row()]) :: String.t()
-  def draw(rows) do
-    lines = [@heads, Enum.map(@heads, fn _ -> "---" end)] ++ Enum.map(rows, &line/1)
-    Enum.map_join(lines, "\n", &("| " <> Enum.join(&1, " | ") <> " |")) <> "\n"
-  end
+  def draw(rows), do: Bench.Table.markdown(@heads, Enum.map(rows, &line/1))
 
   @doc "The rows as a term for `Hal.Json.encode!/1`; microseconds, bytes, ticks a second."
   @spec term([row()], map()) :: {:object, list()}

@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.Watch do
   @moduledoc """
-  A process on a node that records when it is notified of something, by the clock that all
-  processes of a machine share. It is queried over standard input, so that queries do not use what
-  is measured.
+  Records on a node when it is notified of something, by the clock that all processes of a machine share. It is queried
+  over standard input, so that queries do not use what is measured.
   """
 
   @doc """

@@ -22,8 +22,8 @@ defmodule Bench.Page.Main do
 
       IO.puts(
         "\n#{given.robots} robots; #{given.clients} readers, #{given.slow} deaf; #{given.rounds} turns of " <>
-          "#{given.seconds} s each, medians. Processor time without the robots' own. Load of the machine (1 min): #{before || "?"} before, " <>
-          "#{Load.now() || "?"} after; #{System.schedulers_online()} processors."
+          "#{given.seconds} s each, medians. Processor time without the robots' own. " <>
+          "#{Load.words(before)}; #{System.schedulers_online()} processors."
       )
     else
       {:error, line} -> {:error, [line]}
@@ -36,8 +36,7 @@ defmodule Bench.Page.Main do
       {"clients", "N", &Parse.whole(&1, 1..200), "browsers that read (20)"},
       {"slow", "N", &Parse.whole(&1, 1..200), "browsers that read nothing (100)"},
       {"seconds", "S", &Parse.whole(&1, 1..600), "of each turn (15)"},
-      {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"},
-      {"help", nil, nil, "this text"}
+      {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"}
     ]
   end
 end

@@ -1,19 +1,16 @@
 defmodule Bench.Recording.Main do
   @moduledoc "Runs the command `mix bench recording`: reads its options, measures, prints the table."
-  alias Bench.{Command, Load, Recording}
-  alias Console.Cli.{Output, Parse, Progress}
+  alias Bench.{Command, Load, Recording, Table}
+  alias Console.Cli.{Output, Parse}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
   def run(arguments), do: Command.run(arguments, "recording", table(), &measure/1)
 
-  defp measure(given) do
+  defp measure(given), do: Command.in_folder("recording", &measure(given, &1))
+
+  defp measure(given, folder) do
     output = Output.to(:stderr)
-
-    folder =
-      Path.join(System.tmp_dir!(), "convoy-recording-#{System.unique_integer([:positive])}")
-
-    File.mkdir_p!(folder)
     rounds = Map.get(given, "rounds", 7)
 
     jobs =
@@ -21,31 +18,22 @@ defmodule Bench.Recording.Main do
 
     before = Load.now()
 
-    try do
-      results =
-        for {{robots, seed}, n} <- Enum.with_index(jobs) do
-          note = "#{robots} robots, seed #{seed}"
-          line = Progress.line(n, length(jobs), note, (output.columns || 80) - 1)
-          Output.progress(output, line)
-          Recording.measure(robots, seed, rounds, folder)
-        end
-
-      Output.finish(output)
-      measured = for {:ok, measured} <- results, do: measured
-      IO.write(draw(measured))
-
-      IO.puts(
-        "#{rounds} runs of each seed, by turns without and with recording; medians; of what recording " <>
-          "adds, the quartiles and the median of all pairs. Processor time is the VM's.\nLoad of the machine (1 min): #{before || "?"} before, #{Load.now() || "?"} after."
-      )
-
-      case for({:error, line} <- results, do: line) do
-        [] -> :ok
-        lines -> {:error, lines}
+    results =
+      for {{robots, seed}, n} <- Enum.with_index(jobs) do
+        Command.progress(output, n, length(jobs), "#{robots} robots, seed #{seed}")
+        Recording.measure(robots, seed, rounds, folder)
       end
-    after
-      File.rm_rf!(folder)
-    end
+
+    Output.finish(output)
+    measured = for {:ok, measured} <- results, do: measured
+    IO.write(draw(measured))
+
+    IO.puts(
+      "#{rounds} runs of each seed, by turns without and with recording; medians; of what recording " <>
+        "adds, the quartiles and the median of all pairs. Processor time is the VM's.\n#{Load.words(before)}."
+    )
+
+    Command.failed(for({:error, line} <- results, do: line))
   end
 
   @heads [
@@ -74,8 +62,7 @@ defmodule Bench.Recording.Main do
         ]
       end
 
-    [@heads, Enum.map(@heads, fn _head -> "---" end) | rows]
-    |> Enum.map_join(&("| " <> Enum.join(&1, " | ") <> " |\n"))
+    Table.markdown(@heads, rows)
   end
 
   defp added({low, middle, high}), do: "#{low} / #{middle} / #{high}"
@@ -84,8 +71,7 @@ defmodule Bench.Recording.Main do
     [
       {"robots", "N,N", &Parse.wholes(&1, 1..100), "how many robots (6,12)"},
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-5)"},
-      {"rounds", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (7)"},
-      {"help", nil, nil, "this text"}
+      {"rounds", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (7)"}
     ]
   end
 end

@@ -1,7 +1,7 @@
 defmodule Bench.Scale.Main do
   @moduledoc "Runs the command `mix bench scale`: reads its options, measures, prints table and bars."
   alias Bench.{Command, Load, Scale}
-  alias Console.Cli.{Output, Parse, Progress}
+  alias Console.Cli.{Output, Parse}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -16,8 +16,7 @@ defmodule Bench.Scale.Main do
 
     results =
       for {robots, n} <- Enum.with_index(fleets) do
-        line = Progress.line(n, length(fleets), "#{robots} robots", (output.columns || 80) - 1)
-        Output.progress(output, line)
+        Command.progress(output, n, length(fleets), "#{robots} robots")
         Scale.measure(robots, blobs, seconds)
       end
 
@@ -29,8 +28,7 @@ defmodule Bench.Scale.Main do
       IO.write(Scale.draw(measured))
 
       IO.puts(
-        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. Load of the machine (1 min): " <>
-          "#{before || "?"} before, #{Load.now() || "?"} after."
+        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. #{Load.words(before)}."
       )
     else
       lines -> {:error, lines}
@@ -42,8 +40,7 @@ defmodule Bench.Scale.Main do
       {"robots", "N,N", &Parse.wholes(&1, 1..1_000), "how many robots, up to 1000 (6,20,50)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "pictures that are painted, or blobs by geometry: painted, direct (painted)"},
-      {"seconds", "S", &Parse.whole(&1, 1..10_000), "how long, in simulated seconds (20)"},
-      {"help", nil, nil, "this text"}
+      {"seconds", "S", &Parse.whole(&1, 1..10_000), "how long, in simulated seconds (20)"}
     ]
   end
 end

@@ -1,6 +1,6 @@
 defmodule Bench.Soak.Fleet do
   @moduledoc """
-  The nodes of a run and what they have in common: one for each robot, one for the world, each with a keeper
+  Keeps the nodes of a run and what they have in common: one for each robot, one for the world, each with a keeper
   (`Bench.Soak.Fleet.Keeper`). The robots stand abreast before the landmark. The first has the real drivers of a
   Magellan, on emulated devices behind serial lines, so that there are port programs to be left behind.
   """

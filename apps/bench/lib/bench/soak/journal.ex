@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Journal do
-  @moduledoc "The file in which each disturbance is written down with its time, as it happens."
+  @moduledoc "Writes each disturbance into a file with its time, as it happens."
 
   @doc "Opens a new file."
   @spec open(Path.t()) :: :file.io_device()

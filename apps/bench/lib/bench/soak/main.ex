@@ -93,7 +93,7 @@ defmodule Bench.Soak.Main do
       iex> Bench.Soak.Main.arguments(["0.5", "7"])
       {:ok, {0.5, 7}}
       iex> Bench.Soak.Main.arguments(["long"])
-      {:error, "MINUTES cannot be \\"long\\"; a number from 0.1 to 10000 is allowed"}
+      {:error, "MINUTES: expected a number from 0.1 to 10000, got \\"long\\""}
   """
   @spec arguments([String.t()]) :: {:ok, {number(), integer()}} | {:error, String.t()}
   def arguments([]), do: {:ok, {10, 1}}
@@ -104,7 +104,7 @@ defmodule Bench.Soak.Main do
   end
 
   def arguments([_minutes, _seed | rest]),
-    do: {:error, "#{Enum.join(rest, " ")} is too much; MINUTES and SEED are allowed"}
+    do: {:error, "expected MINUTES and SEED, got also #{Enum.join(rest, " ")}"}
 
   defp minutes(text) do
     case Float.parse(text) do
@@ -112,7 +112,7 @@ defmodule Bench.Soak.Main do
         {:ok, if(minutes == trunc(minutes), do: trunc(minutes), else: minutes)}
 
       _other ->
-        {:error, "MINUTES cannot be #{inspect(text)}; a number from 0.1 to 10000 is allowed"}
+        {:error, "MINUTES: expected a number from 0.1 to 10000, got #{inspect(text)}"}
     end
   end
 
@@ -122,8 +122,7 @@ defmodule Bench.Soak.Main do
         {:ok, seed}
 
       _other ->
-        {:error,
-         "SEED cannot be #{inspect(text)}; a whole number from 0 to 1000000000 is allowed"}
+        {:error, "SEED: expected a whole number from 0 to 1000000000, got #{inspect(text)}"}
     end
   end
 end

@@ -1,8 +1,8 @@
 defmodule Bench.Soak.Recorder do
   @moduledoc """
-  A node's log: a file of lines `{microseconds, robot, kind, value}` by the machine's time (CLOCK_MONOTONIC),
-  whole up to the moment in which somebody kills the node. It is no part of the robot, whose processes are
-  killed beside it.
+  Writes a node's log: a file of lines `{microseconds, robot, kind, value}` by the machine's time (CLOCK_MONOTONIC),
+  whole up to the moment in which somebody kills the node. It is no part of the robot, whose processes are killed beside
+  it.
 
   | kind | value |
   |---|---|

@@ -13,9 +13,8 @@ defmodule Bench.Soak.Report do
 
   defp disturbed(s), do: Enum.sum(for kind <- Schedule.kinds(), do: Map.get(s.counts, kind, 0))
 
-  @doc "How many processors it has kept busy."
-  @spec cores(State.t(), non_neg_integer()) :: float()
-  def cores(s, elapsed_ms), do: Enum.sum(Map.values(s.cpu)) * 1000 / max(elapsed_ms, 1)
+  # How many processors it has kept busy.
+  defp cores(s, elapsed_ms), do: Enum.sum(Map.values(s.cpu)) * 1000 / max(elapsed_ms, 1)
 
   @doc "The table at the end."
   @spec table(State.t(), elapsed_ms :: non_neg_integer()) :: String.t()

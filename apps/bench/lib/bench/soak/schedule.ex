@@ -10,6 +10,7 @@ defmodule Bench.Soak.Schedule do
   """
 
   alias Bench.Soak.Schedule.Draw
+  alias Sim.Chaos.Random
 
   @cycle_ms 75_000
   @busy 0.6
@@ -86,10 +87,10 @@ defmodule Bench.Soak.Schedule do
   end
 
   defp several({kind, {least, most}}, random, {from, busy, share, robots}) do
-    {n, random} = Draw.whole(random, round(least * share), max(round(most * share), 1))
+    {n, random} = Random.whole(random, round(least * share), max(round(most * share), 1))
 
     Enum.map_reduce(List.duplicate(kind, n), random, fn kind, random ->
-      {at, random} = Draw.whole(random, 500, busy)
+      {at, random} = Random.whole(random, 500, busy)
       {deed, random} = Draw.one(kind, robots, random)
       {{from + at, deed}, random}
     end)
@@ -97,11 +98,11 @@ defmodule Bench.Soak.Schedule do
 
   # One after the other, with time between them, and none beyond the end.
   defp network(at, until, robots, random) do
-    {pause, random} = Draw.whole(random, 1_000, 15_000)
-    {ms, random} = Draw.whole(random, 500, 12_000)
-    {kind, random} = Draw.pick(random, [:block, :block, :split, :loss])
-    {[a, b | _] = mixed, random} = Draw.shuffle(random, robots)
-    {size, random} = Draw.whole(random, 1, max(length(robots) - 1, 1))
+    {pause, random} = Random.whole(random, 1_000, 15_000)
+    {ms, random} = Random.whole(random, 500, 12_000)
+    {kind, random} = Random.pick(random, [:block, :block, :split, :loss])
+    {[a, b | _] = mixed, random} = Random.shuffle(random, robots)
+    {size, random} = Random.whole(random, 1, max(length(robots) - 1, 1))
     {share, random} = :rand.uniform_s(random)
     at = at + pause
 
@@ -128,8 +129,8 @@ defmodule Bench.Soak.Schedule do
   # Every other cycle, held for a third of the disturbances.
   defp stop(from, busy, robots, random) do
     {chance, random} = :rand.uniform_s(random)
-    {robot, random} = Draw.pick(random, robots)
-    {at, random} = Draw.whole(random, div(busy, 10), div(busy, 2))
+    {robot, random} = Random.pick(random, robots)
+    {at, random} = Random.whole(random, div(busy, 10), div(busy, 2))
     reset = from + at + div(busy, 3)
 
     if chance < 0.5,

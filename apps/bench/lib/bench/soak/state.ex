@@ -1,5 +1,5 @@
 defmodule Bench.Soak.State do
-  @moduledoc "The state of a run of `bin/soak`, and what is noted in it."
+  @moduledoc "Holds the state of a run of `bin/soak`, and what is noted in it."
   alias Bench.Soak.{Journal, Judge, Recorder}
 
   @enforce_keys [:fleet, :journal, :journal_path, :judge, :plan, :duration_ms, :mark, :progress]

@@ -1,7 +1,7 @@
 defmodule Bench.Soak.WorldHost do
   @moduledoc """
-  The world in a process of the operating system of its own: `Sim.World.Server`, and for each robot a line
-  over a socket of the file system (`Bench.Soak.WorldHost.Line`).
+  Runs the world in a process of the operating system of its own: `Sim.World.Server`, and for each robot a line over a
+  socket of the file system (`Bench.Soak.WorldHost.Line`).
 
   Five times a second it writes what has changed since the start of the run (`Sim.World.Snapshot`) to a file,
   whole or not at all; from that the world is started again after a `kill -9`.

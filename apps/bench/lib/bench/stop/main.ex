@@ -8,43 +8,31 @@ defmodule Bench.Stop.Main do
   def run(arguments),
     do: Command.run(arguments, "stop", table(), &measure/1, Command.cases(Stop.cases()))
 
-  defp measure(given) do
+  defp measure(given), do: Command.in_folder("stop", &measure(given, &1))
+
+  defp measure(given, folder) do
     output = Output.to(:stderr)
-    folder = Path.join(System.tmp_dir!(), "convoy-stop-#{System.unique_integer([:positive])}")
-    File.mkdir_p!(folder)
     cases = Map.get(given, "only", Stop.cases())
     note = &Output.progress(output, "bench: " <> &1)
-
-    try do
-      before = Load.now()
-      results = Stop.Runner.run(cases, Map.get(given, "times", 20), folder, note)
-      Output.finish(output)
-
-      about = %{
-        load_before: before,
-        load_after: Load.now(),
-        schedulers: System.schedulers_online()
-      }
-
-      IO.write(Stop.Report.draw(results))
-      IO.puts("\n" <> words(about))
-      Output.json(given["json"], Stop.Report.term(results, about))
-    after
-      File.rm_rf!(folder)
-    end
+    before = Load.now()
+    results = Stop.Runner.run(cases, Map.get(given, "times", 20), folder, note)
+    Output.finish(output)
+    about = %{load_before: before, load_after: Load.now(), schedulers: System.schedulers_online()}
+    IO.write(Stop.Report.draw(results))
+    IO.puts("\n" <> words(about))
+    Output.json(given["json"], Stop.Report.term(results, about))
   end
 
   defp words(about) do
-    "Times run from before the cause to when both axes were told to stand, at the line's other end. Load of the " <>
-      "machine (1 min): #{about.load_before || "?"} before, #{about.load_after || "?"} after; #{about.schedulers} processors."
+    "Times run from before the cause to when both axes were told to stand, at the line's other end. " <>
+      "#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
   end
 
   defp table do
     [
       {"times", "N", &Parse.whole(&1, 1..1_000), "how often each is measured (20)"},
       {"only", "NAME,NAME", &Stop.choose/1, "which cases (all)"},
-      {"json", "FILE", &{:ok, &1}, "write the figures there too, in milliseconds"},
-      {"help", nil, nil, "this text"}
+      {"json", "FILE", &{:ok, &1}, "write the figures there too, in milliseconds"}
     ]
   end
 end

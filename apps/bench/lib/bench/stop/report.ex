@@ -9,9 +9,13 @@ defmodule Bench.Stop.Report do
   @doc "The table, and a line about what cannot be measured."
   @spec draw([Stop.Runner.result()]) :: String.t()
   def draw(results) do
-    lines = [@heads, Enum.map(@heads, fn _ -> "---" end)] ++ Enum.map(results, &line/1)
-    table = Enum.map_join(lines, "\n", &("| " <> Enum.join(&1, " | ") <> " |"))
-    Enum.join([table | Enum.flat_map(results, &pulled/1)], "\n\n") <> "\n"
+    table = Table.markdown(@heads, Enum.map(results, &line/1))
+
+    Enum.map_join(
+      [table | Enum.flat_map(results, &pulled/1)],
+      "\n",
+      &(String.trim_trailing(&1) <> "\n")
+    )
   end
 
   @doc "The figures as a term for `Hal.Json.encode!/1`; milliseconds."

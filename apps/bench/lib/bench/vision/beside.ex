@@ -1,7 +1,7 @@
 defmodule Bench.Vision.Beside do
   @moduledoc """
-  A program of somebody else that searches the same frames in the same run, such as OpenCV from
-  Python, or CMVision where somebody has it.
+  Runs a program of somebody else that searches the same frames in the same run, such as OpenCV from Python, or CMVision
+  where somebody has it.
 
   It is called as `PROGRAM FRAMES LIMITS WIDTH HEIGHT COUNT`: a file of COUNT yuyv frames, and one
   with a line `ylow yhigh ulow uhigh vlow vhigh` for each class. It prints the microseconds that

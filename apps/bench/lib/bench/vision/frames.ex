@@ -1,6 +1,6 @@
 defmodule Bench.Vision.Frames do
   @moduledoc """
-  The frames that `mix bench vision` searches, 640x480 yuyv with eight classes each. Pure.
+  Makes the frames that `mix bench vision` searches, 640x480 yuyv with eight classes each. Pure.
 
     * easy: nine ellipses and rectangles on a grey slope, each in the middle of its class, under
       noise of 3 (Y) and 2 (U, V);

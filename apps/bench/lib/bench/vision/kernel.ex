@@ -4,18 +4,7 @@ defmodule Bench.Vision.Kernel do
   same frames: in this VM, on the same scheduler, with the code and the compiler's options of the
   vision app. It is not in the vision app, because robots do not need it.
   """
-  @on_load :load
-
-  @doc false
-  @spec load() :: :ok
-  def load do
-    _ = :erlang.load_nif(to_charlist(Application.app_dir(:bench, "priv/kernel")), 0)
-    :ok
-  end
-
-  @doc "Whether the C library was built and loaded."
-  @spec loaded?() :: boolean()
-  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
+  use Hal.Nif, app: :bench, library: "kernel"
 
   @doc "Searches yuyv frames; nanoseconds and number of regions of each, from the last to the first."
   @spec find([binary()], pos_integer(), pos_integer(), tables :: binary(), pos_integer()) ::

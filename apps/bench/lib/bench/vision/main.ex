@@ -1,39 +1,35 @@
 defmodule Bench.Vision.Main do
   @moduledoc "Runs the command `mix bench vision`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Vision}
-  alias Console.Cli.{Output, Parse, Progress}
+  alias Console.Cli.{Output, Parse}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
   def run(arguments), do: Command.run(arguments, "vision", table(), &measure/1)
 
-  defp measure(given) do
+  defp measure(given), do: Command.in_folder("vision", &measure(given, &1))
+
+  defp measure(given, folder) do
     output = Output.to(:stderr)
-    folder = Path.join(System.tmp_dir!(), "convoy-vision-#{System.unique_integer([:positive])}")
-    File.mkdir_p!(folder)
     rounds = Map.get(given, "rounds", 40)
     kinds = Map.get(given, "frames", Keyword.keys(Vision.kinds()))
     plan = Map.merge(plan(given["beside"]), %{rounds: rounds, folder: folder})
     photo = Map.get_lazy(given, "photo", &photo/0)
     before = Load.now()
 
-    try do
-      measured =
-        for {kind, n} <- Enum.with_index(kinds) do
-          note = &progress(output, kind, n * rounds + &1, length(kinds) * rounds)
-          {kind, one(kind, photo, plan, note)}
-        end
+    measured =
+      for {kind, n} <- Enum.with_index(kinds) do
+        note = &progress(output, kind, n * rounds + &1, length(kinds) * rounds)
+        {kind, one(kind, photo, plan, note)}
+      end
 
-      Output.finish(output)
-      about = %{load_before: before, load_after: Load.now(), rounds: rounds}
-      IO.write(Vision.Report.draw(plan.ways, measured))
-      IO.puts("\n" <> words(about))
-      json = Output.json(given["json"], Vision.Report.term(plan.ways, measured, about))
-      failed = failed(measured, given["frames"] || given["photo"])
-      if failed == [], do: json, else: {:error, failed}
-    after
-      File.rm_rf!(folder)
-    end
+    Output.finish(output)
+    about = %{load_before: before, load_after: Load.now(), rounds: rounds}
+    IO.write(Vision.Report.draw(plan.ways, measured))
+    IO.puts("\n" <> words(about))
+    json = Output.json(given["json"], Vision.Report.term(plan.ways, measured, about))
+    failed = failed(measured, given["frames"] || given["photo"])
+    if failed == [], do: json, else: {:error, failed}
   end
 
   defp one(kind, photo, plan, note) do
@@ -54,7 +50,7 @@ defmodule Bench.Vision.Main do
 
   defp progress(output, kind, done, all) do
     note = "frames: #{Vision.kinds()[kind]}"
-    Output.progress(output, Progress.line(done, all, note, (output.columns || 80) - 1))
+    Command.progress(output, done, all, note)
   end
 
   defp plan(nil), do: %{ways: Vision.ways(), programs: %{opencv: Vision.Beside.opencv()}}
@@ -71,8 +67,7 @@ defmodule Bench.Vision.Main do
     {width, height, copies} = Vision.Frames.size()
 
     "#{width}x#{height} yuyv, eight classes, #{copies} rolled copies in turn; the median of #{about.rounds} rounds, in each " <>
-      "of which each way searches all copies. Ratios to the kernel in the same round.\nLoad of the machine (1 min): " <>
-      "#{about.load_before || "?"} before, #{about.load_after || "?"} after."
+      "of which each way searches all copies. Ratios to the kernel in the same round.\n#{Load.words(about.load_before, about.load_after)}."
   end
 
   defp table do
@@ -84,8 +79,7 @@ defmodule Bench.Vision.Main do
       {"photo", "FILE", &{:ok, &1}, "the photograph (fruits.jpg of bin/opencv-data)"},
       {"beside", "PROGRAM", &program/1,
        "a program that searches the same frames: PROGRAM FRAMES LIMITS WIDTH\nHEIGHT COUNT prints a line of microseconds for each"},
-      {"json", "FILE", &{:ok, &1}, "write the figures there too"},
-      {"help", nil, nil, "this text"}
+      {"json", "FILE", &{:ok, &1}, "write the figures there too"}
     ]
   end
 

@@ -28,8 +28,19 @@ defmodule Mix.Tasks.Bench do
   """
   use Mix.Task
   alias Console.Cli
-  alias Console.Cli.{MapName, Output, Parse, Progress}
+  alias Console.Cli.{MapName, Parse}
   alias Hal.CommandBuild
+
+  @commands %{
+    "goto" => Bench.Goto.Main,
+    "explore" => Bench.Explore.Main,
+    "swarm" => Bench.Mesh.Main,
+    "stop" => Bench.Stop.Main,
+    "vision" => Bench.Vision.Main,
+    "scale" => Bench.Scale.Main,
+    "page" => Bench.Page.Main,
+    "recording" => Bench.Recording.Main
+  }
 
   @impl Mix.Task
   def run(arguments), do: Hal.CommandOutput.run("bench", fn -> bench(arguments) end)
@@ -45,52 +56,9 @@ defmodule Mix.Tasks.Bench do
     end
   end
 
-  defp bench(["goto" | arguments]) do
+  defp bench([name | arguments]) when is_map_key(@commands, name) do
     CommandBuild.update()
-
-    with {:error, lines} <- Bench.Goto.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["explore" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Explore.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["swarm" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Mesh.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["stop" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Stop.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["vision" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Vision.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["page" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Page.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["recording" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Recording.Main.run(arguments), do: refuse(lines)
-  end
-
-  defp bench(["scale" | arguments]) do
-    CommandBuild.update()
-
-    with {:error, lines} <- Bench.Scale.Main.run(arguments), do: refuse(lines)
+    with {:error, lines} <- @commands[name].run(arguments), do: refuse(lines)
   end
 
   defp bench(["soak" | arguments]) do
@@ -145,30 +113,17 @@ defmodule Mix.Tasks.Bench do
   defp measure(%{"help" => true}), do: help()
 
   defp measure(given) do
-    output = Output.to(:stderr)
     cases = given |> Map.get("cases", Bench.cases()) |> without_landmark(given["landmark"])
     maps = Map.get(given, "maps", ["hall", "hospital"])
     seeds = Map.get(given, "seeds", 1..40)
     blobs = Map.get(given, "blobs", :painted)
     jobs = for case <- cases, map <- maps, seed <- seeds, do: {case, map, seed}
-    count = length(jobs)
 
-    results =
-      jobs
-      |> Task.async_stream(&{&1, job(&1, blobs)}, max_concurrency: 2, timeout: :infinity)
-      |> Enum.with_index(1)
-      |> Enum.map(fn {{:ok, {{case, map, seed}, _result} = result}, done} ->
-        note = "#{case.name} in #{map}, seed #{seed}"
-        Output.progress(output, Progress.line(done, count, note, (output.columns || 80) - 1))
-        result
-      end)
+    named = fn {case, map, seed} -> "#{case.name} in #{map}, seed #{seed}" end
 
-    Output.finish(output)
-
-    failed =
-      for {{case, map, seed}, {:error, line}} <- results,
-          do: "#{case.name} in #{map}, seed #{seed}: #{line}"
-
+    run = fn {case, map, seed} -> Bench.Run.run(case, map, seed, blobs, Sim.Trial) end
+    results = Bench.Command.each(jobs, run, named)
+    failed = for {job, {:error, line}} <- results, do: "#{named.(job)}: #{line}"
     rows = rows(results, cases, maps)
     text = Bench.Table.draw(rows) <> "\n" <> Bench.Table.pooled(rows)
     IO.write(text)
@@ -179,11 +134,6 @@ defmodule Mix.Tasks.Bench do
 
   defp without_landmark(cases, nil), do: cases
   defp without_landmark(cases, :none), do: Enum.map(cases, &put_in(&1.options[:landmark], :none))
-
-  defp job({case, map, seed}, blobs) do
-    Sim.Trial.Memory.prepare()
-    Bench.Run.run(case, map, seed, blobs, Sim.Trial)
-  end
 
   defp rows(results, cases, maps) do
     for case <- cases,
@@ -212,8 +162,7 @@ defmodule Mix.Tasks.Bench do
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "painted or direct (painted)"},
-      {"markdown", "FILE", &{:ok, &1}, "write the table there too"},
-      {"help", nil, nil, "this text"}
+      {"markdown", "FILE", &{:ok, &1}, "write the table there too"}
     ]
   end
 
@@ -222,8 +171,5 @@ defmodule Mix.Tasks.Bench do
     IO.puts("  mix bench demo [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
   end
 
-  defp refuse(lines) do
-    Enum.each(lines, &IO.puts(:stderr, "bench: #{&1}"))
-    exit({:shutdown, 1})
-  end
+  defp refuse(lines), do: Cli.Command.refuse("bench", lines)
 end

@@ -1,10 +1,10 @@
 defmodule Console.Calibrate.Colour do
   @moduledoc """
-  `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their
-  effect in that picture, and writes the colour file.
+  Runs `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their effect in that
+  picture, and writes the colour file.
   """
   alias Console.Calibrate.{ColourOptions, Frames, StdinPrompt}
-  alias Console.Cli.{Diff, Format}
+  alias Console.Cli.{Diff, Format, OutFile}
   alias Vision.Calibration
   alias Vision.Calibration.Sample
   alias Vision.{Colours, Picture}
@@ -33,9 +33,8 @@ defmodule Console.Calibrate.Colour do
     end
   end
 
-  @doc "The result, as lines of text."
-  @spec lines(Calibration.found(), ColourOptions.t()) :: [String.t()]
-  def lines(%{class: class, match: match} = found, options) do
+  # The result, as lines of text.
+  defp lines(%{class: class, match: match} = found, options) do
     {y, u, v} = found.middle
 
     [
@@ -69,9 +68,8 @@ defmodule Console.Calibrate.Colour do
     end
   end
 
-  @doc "The warnings about what a person should check, as lines of text."
-  @spec warnings(Calibration.found(), ColourOptions.t()) :: [String.t()]
-  def warnings(%{match: match} = found, options) do
+  # The warnings about what a person should check, as lines of text.
+  defp warnings(%{match: match} = found, options) do
     [
       found.share < @alike &&
         "WARNING: #{percent(1 - found.share)} of the sample have another colour and were left out: " <>
@@ -157,13 +155,7 @@ defmodule Console.Calibrate.Colour do
   end
 
   defp replace(path, new) do
-    part = path <> ".part"
-
-    with :ok <- File.write(part, new, [:sync]), :ok <- File.rename(part, path) do
-      IO.puts("#{path} written")
-    else
-      {:error, reason} -> {:error, "#{path} cannot be written: #{:file.format_error(reason)}"}
-    end
+    with :ok <- OutFile.write(path, new), do: IO.puts("#{path} written")
   end
 
   defp range({low, high}), do: "#{low} to #{high}"

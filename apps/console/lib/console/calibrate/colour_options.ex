@@ -39,8 +39,7 @@ defmodule Console.Calibrate.ColourOptions do
        "how much more or less light is tolerated (auto: the most, up to 40,\nwith which nothing else in the picture is found)"},
       {"min-area", "PIXELS", &Parse.whole(&1, 1..1_000_000), "smaller blobs are ignored (20)"},
       {"metres", "METRES", &Parse.number(&1, 0.1, 20),
-       "the distance of the thing: gives the constant for the robot file"},
-      {"help", nil, nil, "this text"}
+       "the distance of the thing: gives the constant for the robot file"}
     ]
   end
 
@@ -51,7 +50,7 @@ defmodule Console.Calibrate.ColourOptions do
       iex> {options.source, options.places, options.tolerance}
       {"a.png", [box: {10, 20, 60, 80}], :auto}
       iex> Console.Calibrate.ColourOptions.parse(~w(a.png --box 10,20 --name Red))
-      {:error, [~s(--box cannot be "10,20": X,Y,WIDTH,HEIGHT in pixels from the top left is allowed)]}
+      {:error, [~s(--box: expected X,Y,WIDTH,HEIGHT in pixels from the top left, got "10,20")]}
       iex> Console.Calibrate.ColourOptions.parse(~w(a.png --nmae Red))
       {:error, ["unknown option --nmae; did you mean --name?"]}
   """
@@ -72,7 +71,7 @@ defmodule Console.Calibrate.ColourOptions do
       [
         sources == [] && "SOURCE is missing: a picture, video, stream, /dev/video0 or sim",
         length(sources) > 1 &&
-          "#{length(sources)} sources (#{Enum.join(sources, ", ")}): one is allowed",
+          "expected one source, got #{length(sources)}: #{Enum.join(sources, ", ")}",
         places == [] && "--box X,Y,WIDTH,HEIGHT or --point X,Y is missing",
         map["name"] == nil && "--name NAME is missing",
         map["write"] == true && map["colours"] == nil && "--write needs --colours FILE"

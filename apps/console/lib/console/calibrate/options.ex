@@ -59,8 +59,7 @@ defmodule Console.Calibrate.Options do
       {"true-base", "FACTOR", &Parse.number(&1, 0.8, 1.25),
        "its wheel base, relative to the known one (1.02)"},
       {"true-ratio", "FACTOR", &Parse.number(&1, 0.9, 1.1),
-       "its right wheel's distance, relative to its left one's (1.01)"},
-      {"help", nil, nil, "this text"}
+       "its right wheel's distance, relative to its left one's (1.01)"}
     ]
   end
 

@@ -1,5 +1,5 @@
 defmodule Console.Calibrate.Question do
-  @moduledoc "The questions after a course, and the meaning of the answers. Pure."
+  @moduledoc "Asks the questions after a course, and reads the answers. Pure."
   alias Console.Cli.Parse
   alias Console.Cli.Format
   alias Hal.Pose

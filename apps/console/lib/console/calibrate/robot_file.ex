@@ -4,7 +4,7 @@ defmodule Console.Calibrate.RobotFile do
   but these numbers.
   """
   alias Console.Calibrate.StdinPrompt
-  alias Console.Cli.Diff
+  alias Console.Cli.{Diff, OutFile}
   alias Swarm.MemberSpec
 
   @doc "Reads the file, and the conversions of its drive, `nil` for a drive that has none."
@@ -88,12 +88,7 @@ defmodule Console.Calibrate.RobotFile do
   end
 
   defp replace(path, new) do
-    part = path <> ".part"
-
-    with :ok <- File.write(part, new, [:sync]), :ok <- File.rename(part, path) do
-      IO.puts("#{path} written; mix robot.check #{path} shows what it says")
-    else
-      {:error, reason} -> {:error, "#{path} cannot be written: #{:file.format_error(reason)}"}
-    end
+    with :ok <- OutFile.write(path, new),
+         do: IO.puts("#{path} written; mix robot.check #{path} shows what it says")
   end
 end

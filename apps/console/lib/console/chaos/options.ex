@@ -1,5 +1,5 @@
 defmodule Console.Chaos.Options do
-  @moduledoc "The options of `mix chaos`. Pure. One table describes them and makes the help text."
+  @moduledoc "Reads the options of `mix chaos`. Pure. One table describes them and makes the help text."
   alias Console.Cli.{Arguments, Parse}
 
   @most_runs 1_000_000
@@ -22,14 +22,12 @@ defmodule Console.Chaos.Options do
       iex> {options.runs, options.seed, Console.Chaos.Options.numbers(options)}
       {20, 7, 1..20}
       iex> Console.Chaos.Options.parse(~w(--runs 0))
-      {:error, [~s(--runs cannot be "0": a whole number from 1 to 1000000 is allowed)]}
+      {:error, [~s(--runs: expected a whole number from 1 to 1000000, got "0")]}
       iex> Console.Chaos.Options.parse(~w(--run 3 --runs 20))
       {:error, ["--run and --runs exclude each other; give one of them"]}
   """
   @spec parse([String.t()]) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments) do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     with {:ok, pairs} <- Arguments.parse(arguments, table()), :ok <- one_of(pairs) do
       {:ok, Enum.reduce(pairs, %__MODULE__{}, &put/2)}
     end
@@ -71,8 +69,7 @@ defmodule Console.Chaos.Options do
        "to shrink each violation; 0 leaves the run as it is (40)"},
       {"jobs", "N", &Parse.whole(&1, 1..1024), "how many runs at once (one a processor)"},
       {"json", "FILE|-", &file/1, "write the report (- is standard output)"},
-      {"keep", "DIR", &folder/1, "write each shrunk failure as a scenario into this folder"},
-      {"help", nil, nil, "this text"}
+      {"keep", "DIR", &folder/1, "write each shrunk failure as a scenario into this folder"}
     ]
   end
 

@@ -5,6 +5,7 @@ defmodule Console.Cli.Arguments do
   Written for values that begin with a minus sign (`--landmark -2,1`), for options that may be
   repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
   is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
+  Every command also takes `--help`, or `-h`.
   """
   alias Hal.Options.Wording
   alias Hal.Options.Suggest
@@ -15,6 +16,8 @@ defmodule Console.Cli.Arguments do
   @type option ::
           {name :: String.t(), hint :: String.t() | nil, check() | nil, help :: String.t()}
 
+  @help {"help", nil, nil, "this text"}
+
   @doc """
   The values in the order in which they were given, or one line for each error.
 
@@ -24,14 +27,15 @@ defmodule Console.Cli.Arguments do
       iex> Console.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
       {:error,
        [
-         ~s(--count cannot be "0": a whole number from 1 to 9 is allowed),
+         ~s(--count: expected a whole number from 1 to 9, got "0"),
          "unknown option --cuont; did you mean --count?"
        ]}
   """
   @spec parse([String.t()], [option()]) ::
           {:ok, [{String.t(), term()}]} | {:error, [String.t()]}
   def parse(arguments, options) do
-    results = read(arguments, options)
+    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
+    results = read(arguments, options ++ [@help])
 
     case for {:error, line} <- results, do: line do
       [] -> {:ok, for({:ok, pair} <- results, do: pair)}
@@ -70,7 +74,9 @@ defmodule Console.Cli.Arguments do
   @doc "The options as aligned lines for a help text."
   @spec help([option()]) :: String.t()
   def help(options) do
-    rows = Enum.map(options, fn {name, hint, _check, help} -> {usage(name, hint), help} end)
+    rows =
+      Enum.map(options ++ [@help], fn {name, hint, _check, help} -> {usage(name, hint), help} end)
+
     width = rows |> Enum.map(fn {left, _help} -> String.length(left) end) |> Enum.max()
 
     Enum.map_join(rows, "\n", fn {left, help} ->
@@ -132,12 +138,12 @@ defmodule Console.Cli.Arguments do
   The error for a text that is not what is allowed, in the words of `Hal.Options`.
 
       iex> Console.Cli.Arguments.refuse("--map", "hal", {"hall or arena", "; did you mean hall?"})
-      {:error, ~s(--map cannot be "hal": hall or arena is allowed; did you mean hall?)}
+      {:error, ~s(--map: expected hall or arena, got "hal"; did you mean hall?)}
   """
   @spec refuse(String.t(), String.t(), allowed()) :: {:error, String.t()}
   def refuse(name, text, {allowed, hint}) do
     {:error, [{[], words}]} = Wording.refuse(allowed, text)
-    {:error, "#{name} #{words}#{hint}"}
+    {:error, "#{name}: #{words}#{hint}"}
   end
 
   def refuse(name, text, allowed), do: refuse(name, text, {allowed, ""})

@@ -1,5 +1,5 @@
 defmodule Console.Cli.MapName do
-  @moduledoc "A map on a command line: a built-in one by name, a description, or a picture with its size. Pure."
+  @moduledoc "Reads a map on a command line: a built-in one by name, a description, or a picture with its size. Pure."
   alias Console.Cli.Parse
   alias Sim.Floorplan.Maps
 

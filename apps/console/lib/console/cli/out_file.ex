@@ -19,9 +19,9 @@ defmodule Console.Cli.OutFile do
     end
   end
 
-  @doc "Writes the file; the error names the option, the file and the reason."
-  @spec write(option :: String.t(), Path.t(), iodata()) :: :ok | {:error, String.t()}
-  def write(option, path, content) do
+  @doc "Writes the file; the error names the option, if any, the file and the reason."
+  @spec write(option :: String.t() | nil, Path.t(), iodata()) :: :ok | {:error, String.t()}
+  def write(option \\ nil, path, content) do
     written =
       case place(path) do
         {:new, part} -> replace(part, path, content)
@@ -64,5 +64,7 @@ defmodule Console.Cli.OutFile do
   defp explain(_option, _path, :ok), do: :ok
 
   defp explain(option, path, {:error, reason}),
-    do: {:error, "#{option} #{path} cannot be written: #{:file.format_error(reason)}"}
+    do:
+      {:error,
+       "#{option && option <> " "}#{path} cannot be written: #{:file.format_error(reason)}"}
 end

@@ -1,5 +1,5 @@
 defmodule Console.Cli.Progress do
-  @moduledoc "The line that shows how far a run is. Pure."
+  @moduledoc "Draws the line that shows how far a run is. Pure."
   alias Console.Cli.Format
 
   @width 24

@@ -1,7 +1,7 @@
 defmodule Console.Live.Fleet do
   @moduledoc """
-  A fleet of complete robots in real time: each robot has its own tree of processes, and `Swarm`
-  commands it as it commands real ones.
+  Runs a fleet of complete robots in real time: each robot has its own tree of processes, and `Swarm` commands it as it
+  commands real ones.
   """
   @behaviour Console.Live
   alias Console.Cli.Format

@@ -1,6 +1,6 @@
 defmodule Console.Live.Mesh do
   @moduledoc """
-  The robots of the mesh that this node is part of, whoever started them: what `bin/console` shows on its page.
+  Shows the robots of the mesh that this node is part of, whoever started them: what `bin/console` shows on its page.
 
   It asks four times a second for their status, and commands them, by `Swarm` alone, as a person does in a shell. No robot
   knows it: whether it hangs or dies changes nothing for them. Robots that come are shown by themselves, robots that have
@@ -80,7 +80,7 @@ defmodule Console.Live.Mesh do
   def init(connect) do
     {:ok,
      %{
-       begun_ms: now(),
+       begun_ms: Hal.Clock.now_ms(),
        view: View.new(),
        notice: Notice.new(connect),
        asked: nil,
@@ -90,7 +90,10 @@ defmodule Console.Live.Mesh do
 
   @impl GenServer
   def handle_call(:robots, _from, s), do: {:reply, View.robots(s.view), s}
-  def handle_call(:scene, _from, s), do: {:reply, View.scene(s.view, now() - s.begun_ms), s}
+
+  def handle_call(:scene, _from, s),
+    do: {:reply, View.scene(s.view, Hal.Clock.now_ms() - s.begun_ms), s}
+
   def handle_call(:notice, _from, s), do: {:reply, s.notice.line, s}
   def handle_call(:statuses, _from, s), do: {:reply, View.statuses(s.view), s}
 
@@ -105,8 +108,10 @@ defmodule Console.Live.Mesh do
 
   def handle_info({ref, statuses}, %{asked: ref} = s) do
     Process.demonitor(ref, [:flush])
-    view = View.update(s.view, statuses, clock(), now() - s.begun_ms)
-    {:noreply, %{s | asked: nil, view: view, notice: Notice.look(s.notice, seen(view), now())}}
+    view = View.update(s.view, statuses, clock(), Hal.Clock.now_ms() - s.begun_ms)
+
+    {:noreply,
+     %{s | asked: nil, view: view, notice: Notice.look(s.notice, seen(view), Hal.Clock.now_ms())}}
   end
 
   # What the mesh says of itself; `nil` for nodes where there is none.
@@ -125,6 +130,4 @@ defmodule Console.Live.Mesh do
     {_date, {hour, minute, second}} = :calendar.local_time()
     to_string(:io_lib.format("~2..0B:~2..0B:~2..0B", [hour, minute, second]))
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

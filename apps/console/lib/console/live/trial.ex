@@ -1,7 +1,7 @@
 defmodule Console.Live.Trial do
   @moduledoc """
-  A trial that a person watches: the lockstep run, at the pace that the person wants
-  (`Console.Live.Pace`), at first one step of 100 ms each 100 ms.
+  Runs a trial that a person watches: the lockstep run, at the pace that the person wants (`Console.Live.Pace`), at
+  first one step of 100 ms each 100 ms.
 
   It never runs faster to make up for lost time: on a machine too slow for its fleet the run is
   slow, and an answer may take as long as a step. Whatever the pace, the same commands at the same
@@ -80,7 +80,7 @@ defmodule Console.Live.Trial do
       pace: pace,
       recorder: recorder,
       tick: 0,
-      due_ms: now_ms()
+      due_ms: Hal.Clock.now_ms()
     }
 
     {:ok, schedule(s, s.due_ms)}
@@ -100,8 +100,11 @@ defmodule Console.Live.Trial do
 
   def handle_call({:command, {:pace, command}}, _from, state) do
     case Pace.command(state.pace, command) do
-      {:ok, pace} -> {:reply, {:ok, Pace.words(pace)}, schedule(%{state | pace: pace}, now_ms())}
-      {:error, line} -> {:reply, {:error, line}, state}
+      {:ok, pace} ->
+        {:reply, {:ok, Pace.words(pace)}, schedule(%{state | pace: pace}, Hal.Clock.now_ms())}
+
+      {:error, line} ->
+        {:reply, {:error, line}, state}
     end
   end
 
@@ -115,7 +118,7 @@ defmodule Console.Live.Trial do
   @impl GenServer
   def handle_info({:step, tick}, %{tick: tick} = state) do
     trial = state.trial |> state.module.step() |> record(state.trial, state.recorder)
-    state = %{state | trial: trial, pace: Pace.stepped(state.pace, now_ms())}
+    state = %{state | trial: trial, pace: Pace.stepped(state.pace, Hal.Clock.now_ms())}
     {:noreply, schedule(state, state.due_ms)}
   end
 
@@ -137,13 +140,11 @@ defmodule Console.Live.Trial do
         %{state | tick: tick + 1}
 
       wait_ms ->
-        due_ms = max(last_ms + wait_ms, now_ms())
+        due_ms = max(last_ms + wait_ms, Hal.Clock.now_ms())
         _timer = Process.send_after(self(), {:step, tick + 1}, due_ms, abs: true)
         %{state | tick: tick + 1, due_ms: due_ms}
     end
   end
-
-  defp now_ms, do: System.monotonic_time(:millisecond)
 
   defp carry_out({:kill, :leader}, %{module: module, trial: trial}) do
     case module.scene(trial).leader do

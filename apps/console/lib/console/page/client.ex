@@ -25,7 +25,7 @@ defmodule Console.Page.Client do
 
   @doc "Carries out a line; its answer goes to the browser."
   @spec obey(pid(), String.t()) :: :ok
-  def obey(client, line), do: GenServer.cast(client, {:obey, line, now_ms()})
+  def obey(client, line), do: GenServer.cast(client, {:obey, line, Hal.Clock.now_ms()})
 
   @doc """
   A word of the keyboard: the robot, its speed forward and its turn, as parts of the greatest (-1 to 1).
@@ -68,7 +68,7 @@ defmodule Console.Page.Client do
 
   def handle_cast({:obey, line, said_ms}, s) do
     case drive(line, s.robots.()) do
-      {:ok, robot, speed} -> {:noreply, drive(s, robot, speed, now_ms() - said_ms)}
+      {:ok, robot, speed} -> {:noreply, drive(s, robot, speed, Hal.Clock.now_ms() - said_ms)}
       :other -> {:noreply, answer(s, line, carry_out(line, s))}
       error -> {:noreply, answer(s, line, error)}
     end
@@ -133,6 +133,4 @@ defmodule Console.Page.Client do
         {:error, line}
     end
   end
-
-  defp now_ms, do: System.monotonic_time(:millisecond)
 end

@@ -1,7 +1,6 @@
 defmodule Console.Picture.Colours do
   @moduledoc """
-  The colour and size of each robot in a drawing; the colours are distinguishable for the
-  colour-blind. Pure.
+  Chooses the colour and size of each robot in a drawing; the colours are distinguishable for the colour-blind. Pure.
 
   The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
   """

@@ -1,6 +1,6 @@
 defmodule Console.Picture.Floor do
   @moduledoc """
-  The upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
+  Draws the upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
   """
   alias Console.Picture.{MapView, RunTrack, Svg}
   alias Console.Picture.{Colours, Labels}

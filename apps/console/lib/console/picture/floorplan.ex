@@ -1,5 +1,5 @@
 defmodule Console.Picture.Floorplan do
-  @moduledoc "The map of a simulated world as a `Console.Picture.MapView`. Pure."
+  @moduledoc "Presents the map of a simulated world as a `Console.Picture.MapView`. Pure."
   alias Console.Picture.MapView
 
   @doc """

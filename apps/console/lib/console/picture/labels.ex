@@ -1,5 +1,5 @@
 defmodule Console.Picture.Labels do
-  @moduledoc "Names and numbered stages on a run's picture, placed so that they hide little. Pure."
+  @moduledoc "Places names and numbered stages on a run's picture so that they hide little. Pure."
   alias Console.Picture.{RunTrack, Svg}
   alias Console.Picture.Colours
   alias Hal.Pose

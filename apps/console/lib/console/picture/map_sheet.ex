@@ -1,6 +1,6 @@
 defmodule Console.Picture.MapSheet do
   @moduledoc """
-  The built-in maps side by side as one drawing (SVG), for the user guide. Pure.
+  Draws the built-in maps side by side (SVG), for the user guide. Pure.
 
   All are drawn as they are for six robots, each as large as its frame allows.
   """

@@ -1,6 +1,6 @@
 defmodule Console.Picture.MapView do
   @moduledoc """
-  A map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
+  Holds a map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
   """
 
   @enforce_keys [:name, :width, :height, :wall?]

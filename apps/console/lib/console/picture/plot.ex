@@ -1,5 +1,5 @@
 defmodule Console.Picture.Plot do
-  @moduledoc "The lower part of a run's picture: the formation error over time, with the stages. Pure."
+  @moduledoc "Draws the lower part of a run's picture: the formation error over time, with the stages. Pure."
   alias Console.Cli.Format
   alias Console.Picture.{RunTrack, Svg}
   alias Console.Picture.Labels

@@ -1,6 +1,7 @@
 defmodule Console.Replay.Command do
   @moduledoc "Reads what a person types in `mix replay FILE --step`. Pure."
   alias Console.Cli.{Arguments, Parse}
+  alias Console.Replay.Asked
   alias Hal.Options.Suggest
 
   @words ~w(step back goto next previous show why help quit)
@@ -28,7 +29,7 @@ defmodule Console.Replay.Command do
       iex> Console.Replay.Command.parse("stepp", ["mag1"], 25.0)
       {:error, ~s("stepp" is not known; did you mean step?)}
       iex> Console.Replay.Command.parse("goto 30", ["mag1"], 25.0)
-      {:error, ~s(goto cannot be "30": a number from 0 to 25.0 is allowed)}
+      {:error, ~s(goto: expected a number from 0 to 25.0, got "30")}
   """
   @spec parse(String.t(), [String.t()], float()) :: {:ok, t()} | {:error, line :: String.t()}
   def parse(line, names, last_s) do
@@ -106,15 +107,8 @@ defmodule Console.Replay.Command do
 
   defp named(what, [], _names), do: {:ok, {what, nil}}
 
-  defp named(what, [name], names) do
-    if name in names do
-      {:ok, {what, name}}
-    else
-      {:error,
-       "#{what} names no robot of the recording: #{name}; allowed are " <>
-         Enum.join(names, ", ") <> Suggest.hint(name, names)}
-    end
-  end
+  defp named(what, [name], names),
+    do: with(:ok <- Asked.name(what, name, names), do: {:ok, {what, name}})
 
   defp named(what, _more, _names), do: {:error, "#{what} takes one name at most"}
 end

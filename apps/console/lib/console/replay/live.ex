@@ -4,9 +4,8 @@ defmodule Console.Replay.Live do
   the same again, how they were at a time, and why.
   """
   alias Robot.Recording
-  alias Console.Cli.{Format, Output, Progress}
-  alias Console.Replay.{LiveText, Options}
-  alias Hal.Options.Suggest
+  alias Console.Cli.{Output, Progress}
+  alias Console.Replay.{Asked, LiveText, Options}
   alias Robot.Replay
 
   @progress_ms 100
@@ -30,11 +29,7 @@ defmodule Console.Replay.Live do
     names = Enum.map(Recording.File.ids(file), &Atom.to_string/1)
     last_s = (file.end_ms - file.start_ms) / 1000
 
-    with :ok <- only_lockstep(options),
-         :ok <- known("--robot", options.robot, names),
-         :ok <- known("--why", options.why, names),
-         :ok <- within("--at", options.at_s, last_s),
-         do: within("--until", options.until_s, last_s)
+    with :ok <- only_lockstep(options), do: Asked.check(options, names, names, last_s)
   end
 
   defp only_lockstep(options) do
@@ -48,23 +43,6 @@ defmodule Console.Replay.Live do
         {:error, "#{option} needs a recording of a run in lockstep; this is one of live robots"}
     end)
   end
-
-  defp known(option, name, names) do
-    if name == nil or name in names do
-      :ok
-    else
-      {:error,
-       "#{option} names no robot of the recording: #{name}; allowed are " <>
-         Enum.join(names, ", ") <> Suggest.hint(name, names)}
-    end
-  end
-
-  defp within(option, at_s, last_s) when at_s != nil and at_s > last_s,
-    do:
-      {:error,
-       "#{option} #{at_s} is after the end of the recording, #{Format.decimals(last_s, 1)} s"}
-
-  defp within(_option, _at_s, _last_s), do: :ok
 
   defp replay(options, file) do
     output = Output.to(:stdio)
@@ -83,7 +61,7 @@ defmodule Console.Replay.Live do
           found: [],
           count: 0,
           last_ms: 0,
-          drawn_ms: now(),
+          drawn_ms: Hal.Clock.now_ms(),
           output: output
         },
         &step/2
@@ -120,15 +98,13 @@ defmodule Console.Replay.Live do
   defp draw(%{output: %Output{columns: nil}} = run), do: run
 
   defp draw(run) do
-    if now() - run.drawn_ms >= @progress_ms do
+    if Hal.Clock.now_ms() - run.drawn_ms >= @progress_ms do
       whole_s = (run.file.end_ms - run.file.start_ms) / 1000
       line = Progress.line(run.last_ms / 1000, whole_s, "replayed", run.output.columns - 1)
       Output.progress(run.output, line)
-      %{run | drawn_ms: now()}
+      %{run | drawn_ms: Hal.Clock.now_ms()}
     else
       run
     end
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,5 +1,5 @@
 defmodule Console.Replay.Options do
-  @moduledoc "The options of `mix replay`, checked once when it starts. Pure."
+  @moduledoc "Reads the options of `mix replay`, checked once when it starts. Pure."
   alias Console.Cli.{Arguments, Parse}
 
   defstruct file: nil,
@@ -36,8 +36,6 @@ defmodule Console.Replay.Options do
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     {files, rest} =
       case arguments do
         ["-" <> _ | _] -> {[], arguments}
@@ -101,8 +99,7 @@ defmodule Console.Replay.Options do
        "compare with another recording: the first tick that differs, and in what"},
       {"step", nil, nil, "go forwards and backwards tick by tick, and ask: a prompt"},
       {"csv", "DIR", &Parse.folder(&1, folder),
-       "write poses, errors, messages and ticks as tables"},
-      {"help", nil, nil, "this text"}
+       "write poses, errors, messages and ticks as tables"}
     ]
   end
 

@@ -1,5 +1,5 @@
 defmodule Console.Replay.Why do
-  @moduledoc "Why a robot did what it did at one tick (`t:Swarm.Replay.reasons/0`), for people. Pure."
+  @moduledoc "Explains to people why a robot did what it did at one tick (`t:Swarm.Replay.reasons/0`). Pure."
   alias Console.Cli.Format
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}

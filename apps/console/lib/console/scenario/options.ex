@@ -1,7 +1,7 @@
 defmodule Console.Scenario.Options do
   @moduledoc """
-  The arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded
-  (`nil`: nowhere). Pure.
+  Reads the arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded (`nil`:
+  nowhere). Pure.
   """
   alias Console.Cli.{Arguments, Parse}
 
@@ -24,7 +24,6 @@ defmodule Console.Scenario.Options do
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | :help | {:error, [String.t(), ...]}
   def parse(arguments, folder \\ ".") do
     {files, options} = Arguments.words(arguments, table(folder))
-    options = Enum.map(options, &if(&1 == "-h", do: "--help", else: &1))
 
     with {:ok, given} <- Arguments.parse(options, table(folder)) do
       cond do
@@ -47,8 +46,7 @@ defmodule Console.Scenario.Options do
     [
       {"record", "DIR", &Parse.folder(&1, folder),
        "where the runs that fail are recorded, for mix replay (here)"},
-      {"quiet", nil, nil, "print only what failed, and the last line"},
-      {"help", nil, nil, "this text"}
+      {"quiet", nil, nil, "print only what failed, and the last line"}
     ]
   end
 

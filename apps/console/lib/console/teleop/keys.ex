@@ -1,6 +1,6 @@
 defmodule Console.Teleop.Keys do
   @moduledoc """
-  The keys of a terminal that drives a robot, one character at a time. Pure.
+  Reads the keys of a terminal that drives a robot, one character at a time. Pure.
 
   | key | |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Editor do
   @moduledoc """
-  A line editor, key by key: moving, deleting, history, completion. Pure.
+  Edits a line, key by key: moving, deleting, history, completion. Pure.
 
   The view draws it, so the terminal itself must not echo. A line ends at `:most` bytes and a
   character beyond them, so that whoever reads it sees that it was longer; the rest is dropped.

@@ -1,5 +1,5 @@
 defmodule Console.Terminal.Style do
-  @moduledoc "Styled rows to text with ANSI colours. Pure."
+  @moduledoc "Turns styled rows into text with ANSI colours. Pure."
 
   @codes %{
     plain: "0",

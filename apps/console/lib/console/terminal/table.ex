@@ -1,5 +1,5 @@
 defmodule Console.Terminal.Table do
-  @moduledoc "The robots as a table that fits the screen. Pure."
+  @moduledoc "Lists the robots in a table that fits the screen. Pure."
   alias Console.Cli.Format
   alias Sim.Scene
 

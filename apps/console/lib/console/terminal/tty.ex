@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Tty do
   @moduledoc """
-  The terminal in raw mode: single keys instead of lines, and its settings restored at the end.
+  Puts the terminal into raw mode: single keys instead of lines, and its settings restored at the end.
 
   Ctrl-C comes as a key too: it must not stop the program while the terminal is changed.
   """

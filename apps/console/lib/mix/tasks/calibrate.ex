@@ -11,20 +11,17 @@ defmodule Mix.Tasks.Calibrate do
   Exit status: 0 if all went well, 1 if the input or a measurement was wrong.
   """
   use Mix.Task
-  alias Hal.CommandBuild
   alias Hal.Options.Suggest
 
   @words ["odometry", "colour"]
 
   @impl Mix.Task
-  def run(arguments) do
-    Hal.CommandOutput.run("calibrate", fn ->
-      CommandBuild.update()
-      calibrate(arguments)
-    end)
-  end
+  def run(arguments),
+    do: Hal.CommandOutput.run("calibrate", fn -> calibrate(arguments) end)
 
   defp calibrate(arguments) do
+    Hal.CommandBuild.update()
+
     case arguments do
       ["odometry" | rest] ->
         odometry(rest)
@@ -36,9 +33,7 @@ defmodule Mix.Tasks.Calibrate do
         IO.puts(@moduledoc)
 
       [word | _rest] ->
-        refuse(
-          "#{inspect(word)} cannot be calibrated: odometry or colour#{Suggest.hint(word, @words)}"
-        )
+        refuse("expected odometry or colour, got #{inspect(word)}#{Suggest.hint(word, @words)}")
 
       [] ->
         refuse("mix calibrate needs a command: mix calibrate odometry or mix calibrate colour")
@@ -59,8 +54,7 @@ defmodule Mix.Tasks.Calibrate do
   @spec refuse(String.t() | [String.t()]) :: no_return()
   @spec refuse(String.t() | [String.t()], String.t() | nil) :: no_return()
   defp refuse(lines, more \\ nil) do
-    for line <- List.wrap(lines) ++ List.wrap(more), do: IO.puts(:stderr, "calibrate: #{line}")
-    exit({:shutdown, 1})
+    Console.Cli.Command.refuse("calibrate", List.wrap(lines) ++ List.wrap(more))
   end
 
   defp odometry_help do

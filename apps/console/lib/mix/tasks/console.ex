@@ -13,8 +13,6 @@ defmodule Mix.Tasks.Console do
 
   @impl Mix.Task
   def run(arguments) do
-    arguments = Enum.map(arguments, &if(&1 == "-h", do: "--help", else: &1))
-
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
       options =
         Map.merge(%{"page-address" => {127, 0, 0, 1}, "page-token" => nil}, Map.new(pairs))
@@ -30,7 +28,7 @@ defmodule Mix.Tasks.Console do
       {"connect", "NAME@HOST", &connect/1,
        "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
       {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
-    ] ++ Console.Options.Page.table() ++ [{"help", nil, nil, "this text"}]
+    ] ++ Console.Options.Page.table()
   end
 
   defp help do
@@ -103,8 +101,5 @@ defmodule Mix.Tasks.Console do
     end
   end
 
-  defp refused({:error, lines}) do
-    lines |> List.wrap() |> Enum.each(&IO.puts(:stderr, "console: #{&1}"))
-    exit({:shutdown, 1})
-  end
+  defp refused({:error, lines}), do: Cli.Command.refuse("console", List.wrap(lines))
 end

@@ -12,8 +12,8 @@ defmodule Mix.Tasks.Demo do
   """
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
-  alias Hal.CommandBuild
   alias Console.Terminal.Session
+  alias Sim.Fleet
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
   @robots_a_processor 20
@@ -22,14 +22,11 @@ defmodule Mix.Tasks.Demo do
   @nodes_a_processor 15
 
   @impl Mix.Task
-  def run(arguments), do: Hal.CommandOutput.run("demo", fn -> demo(arguments) end)
+  def run(arguments) do
+    Console.Cli.Command.run("demo", fn ->
+      # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
+      Logger.configure(level: :none)
 
-  defp demo(arguments) do
-    CommandBuild.update()
-    # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
-    Logger.configure(level: :none)
-
-    status =
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         {:ok, %Options{help: true}} ->
           IO.write(Options.help())
@@ -37,18 +34,10 @@ defmodule Mix.Tasks.Demo do
         {:ok, options} ->
           with :ok <- Report.check(options), :ok <- doors(options), do: play(options)
 
-        {:error, lines} ->
-          {:error, lines}
+        errors ->
+          errors
       end
-
-    status =
-      with {:error, lines} <- status do
-        lines |> List.wrap() |> Enum.each(&IO.puts(:stderr, "demo: #{&1}"))
-        IO.puts(:stderr, "demo: --help lists all options")
-        1
-      end
-
-    if is_integer(status) and status > 0, do: exit({:shutdown, status})
+    end)
   end
 
   # What a node lets in is decided when its Erlang starts.
@@ -66,7 +55,7 @@ defmodule Mix.Tasks.Demo do
 
     cond do
       options.headless and Options.real_time?(options) ->
-        recorded(options, &Demo.run(&1, Live.Paced, paced()))
+        recorded(options, &Demo.run(&1, Fleet, paced()))
 
       options.headless ->
         Sim.Trial.Memory.prepare(length(options.robots))
@@ -78,7 +67,7 @@ defmodule Mix.Tasks.Demo do
   end
 
   defp paced,
-    do: [lines: &Live.Paced.lines/1, ended: &Live.Paced.ended/1, stop: &Live.Paced.stop/1]
+    do: [lines: &Fleet.lines/1, ended: &Fleet.ended/1, stop: &Fleet.stop/1]
 
   defp lockstep(%{record: nil} = options, pace),
     do: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1, pace))

@@ -7,31 +7,18 @@ defmodule Mix.Tasks.Replay do
   not recorded; 1 something was wrong with the input.
   """
   use Mix.Task
-  alias Hal.CommandBuild
+  alias Console.Cli.Command
   alias Console.Replay
   alias Console.Replay.Options
 
   @impl Mix.Task
-  def run(arguments), do: Hal.CommandOutput.run("replay", fn -> replay(arguments) end)
-
-  defp replay(arguments) do
-    CommandBuild.update()
-
-    status =
+  def run(arguments) do
+    Command.run("replay", fn ->
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
-        {:ok, %Options{help: true}} ->
-          IO.write(Options.help())
-          0
-
-        {:ok, options} ->
-          Replay.run(options)
-
-        {:error, lines} ->
-          Enum.each(lines, &IO.puts(:stderr, "replay: #{&1}"))
-          IO.puts(:stderr, "replay: --help lists all options")
-          1
+        {:ok, %Options{help: true}} -> IO.write(Options.help())
+        {:ok, options} -> Replay.run(options)
+        errors -> errors
       end
-
-    if status > 0, do: exit({:shutdown, status})
+    end)
   end
 end

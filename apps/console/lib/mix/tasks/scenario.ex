@@ -7,33 +7,16 @@ defmodule Mix.Tasks.Scenario do
   Exit status: 0 if all expectations hold; 2 if one failed; 1 if the input was wrong.
   """
   use Mix.Task
-  alias Hal.CommandBuild
   alias Console.Scenario.{Options, Session}
 
   @impl Mix.Task
   def run(arguments) do
-    Hal.CommandOutput.run("scenario", fn ->
-      CommandBuild.update()
-      status = scenario(arguments)
-      if is_integer(status) and status > 0, do: exit({:shutdown, status})
+    Console.Cli.Command.run("scenario", fn ->
+      case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
+        :help -> IO.write(Options.help())
+        {:ok, options} -> Session.run(options)
+        errors -> errors
+      end
     end)
-  end
-
-  defp scenario(arguments) do
-    case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
-      :help -> IO.write(Options.help())
-      {:ok, options} -> play(options)
-      {:error, lines} -> refuse(lines)
-    end
-  end
-
-  defp play(options) do
-    with {:error, lines} <- Session.run(options), do: refuse(lines)
-  end
-
-  defp refuse(lines) do
-    Enum.each(lines, &IO.puts(:stderr, "scenario: #{&1}"))
-    IO.puts(:stderr, "scenario: --help shows how it is used")
-    1
   end
 end

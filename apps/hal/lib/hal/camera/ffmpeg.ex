@@ -3,7 +3,7 @@ defmodule Hal.Camera.FFmpeg do
   alias Hal.Frame
 
   @moduledoc """
-  A camera that reads any source that ffmpeg can read: a V4L2 device, a stream, a video file, a
+  Reads any source that ffmpeg can read: a V4L2 device, a stream, a video file, a
   picture, a test picture (`Hal.Camera.Source`).
 
   Options:
@@ -59,7 +59,7 @@ defmodule Hal.Camera.FFmpeg do
   Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Camera.FFmpeg.options(source: "testsrc", loop: 1)
-      {:error, "camera option loop cannot be 1: true or false is allowed"}
+      {:error, "camera option loop: expected true or false, got 1"}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}
   defdelegate options(options), to: Options, as: :check

@@ -1,6 +1,6 @@
 defmodule Hal.Camera.Options do
   @moduledoc """
-  The options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
+  Checks the options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
   """
   alias Hal.Camera.Source
   alias Hal.Options
@@ -33,11 +33,11 @@ defmodule Hal.Camera.Options do
   Checks the options and adds the defaults; the error is one line that says what is wrong.
 
       iex> Hal.Camera.Options.check(source: "/dev/video0", norm: :palm)
-      {:error, "camera option norm cannot be :palm: :pal, :ntsc or :secam is allowed; did you mean :pal?"}
+      {:error, "camera option norm: expected :pal, :ntsc or :secam, got :palm; did you mean :pal?"}
       iex> Hal.Camera.Options.check(source: "a.mp4", norm: :pal)
       {:error, ~s(camera option norm is for a V4L2 device such as /dev/video0, not for "a.mp4")}
-      iex> Hal.Camera.Options.check(source: "gopher://camera/1") |> elem(1) |> String.slice(0, 68)
-      "camera option source cannot be \\"gopher://camera/1\\": gopher:// is not"
+      iex> Hal.Camera.Options.check(source: "gopher://camera/1") |> elem(1) |> String.slice(0, 42)
+      "camera option source: expected a stream by"
   """
   @spec check(keyword()) :: {:ok, keyword()} | {:error, line :: String.t()}
   def check(options) do
@@ -62,7 +62,7 @@ defmodule Hal.Camera.Options do
   defp refused(options) do
     why = unless options[:unsafe], do: Source.refused(options[:source])
     source = Options.Wording.show(options[:source])
-    if why, do: [{["source"], "cannot be #{source}: #{why}, or unsafe: true"}], else: []
+    if why, do: [{["source"], "#{why}, or unsafe: true, got #{source}"}], else: []
   end
 
   @doc false

@@ -1,7 +1,7 @@
 defmodule Hal.Camera.Source do
   @moduledoc """
-  The sources that a camera can read, and ffmpeg's arguments for them. Pure, except that `check/1`
-  looks at the file system.
+  Lists the sources that a camera can read, and ffmpeg's arguments for them. Pure, except that `check/1` looks at the
+  file system.
 
   | source | is |
   |---|---|
@@ -69,9 +69,9 @@ defmodule Hal.Camera.Source do
       iex> Hal.Camera.Source.refused("rtsp://camera/1")
       nil
       iex> Hal.Camera.Source.refused("lavfi:testsrc,metadata=print:file=out.txt")
-      "a filter graph can write files; one generator such as testsrc2=size=64x48 is allowed"
+      "expected one generator such as testsrc2=size=64x48, because a filter graph can write files"
       iex> Hal.Camera.Source.refused("gopher://camera/1")
-      "gopher:// is not a scheme of streams; rtsp, rtsps, rtmp, rtmps, rtp, srt, udp, tcp, http, https are allowed"
+      "expected a stream by rtsp, rtsps, rtmp, rtmps, rtp, srt, udp, tcp, http, https"
   """
   @spec refused(String.t()) :: nil | (why :: String.t())
   def refused("lavfi:" <> graph) do
@@ -80,7 +80,7 @@ defmodule Hal.Camera.Source do
         nil
 
       _other ->
-        "a filter graph can write files; one generator such as testsrc2=size=64x48 is allowed"
+        "expected one generator such as testsrc2=size=64x48, because a filter graph can write files"
     end
   end
 
@@ -88,7 +88,7 @@ defmodule Hal.Camera.Source do
     with :stream <- kind(source),
          [scheme, _rest] = String.split(source, ":", parts: 2),
          false <- String.downcase(scheme) in @schemes do
-      "#{scheme}:// is not a scheme of streams; #{Enum.join(@schemes, ", ")} are allowed"
+      "expected a stream by #{Enum.join(@schemes, ", ")}"
     else
       _known -> nil
     end

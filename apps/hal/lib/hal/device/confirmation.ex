@@ -1,7 +1,7 @@
 defmodule Hal.Device.Confirmation do
   @moduledoc """
-  Those who wait to hear whether what a drive was told has a base behind it (`Hal.Device.confirm/3`). Runs in the device's
-  process.
+  Answers those who wait to hear whether what a drive was told has a base behind it (`Hal.Device.confirm/3`). Runs in
+  the device's process.
 
   A line that is open and takes bytes proves nothing: its program may be frozen, its cable cut. The next report of the
   wheels does.

@@ -3,7 +3,7 @@ defmodule Hal.Device.Server do
   Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
   which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.Device.{Confirmation, Lifecycle, Publisher, State, Wishes}
   alias Hal.{HardenedServer, Twist}
 
@@ -48,8 +48,6 @@ defmodule Hal.Device.Server do
     {:reply, answer, s}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:drive, %Twist{linear: linear, turn: turn} = twist}, %{kind: :drive} = s)
       when is_number(linear) and is_number(turn) and abs(linear) < @senseless and
@@ -91,8 +89,6 @@ defmodule Hal.Device.Server do
 
   def handle_cast({:zoom, angle}, %{kind: :ptz} = s) when is_float(angle),
     do: {:noreply, Wishes.wish(s, :zoom, [angle])}
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}

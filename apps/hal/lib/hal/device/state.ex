@@ -1,7 +1,7 @@
 defmodule Hal.Device.State do
   @moduledoc """
-  The state of a device's process: its options, the open driver, and what was last published.
-  These modules work on it:
+  Holds the state of a device's process: its options, the open driver, and what was last published. These modules work
+  on it:
 
   | module | what it does |
   |---|---|

@@ -1,5 +1,5 @@
 defmodule Hal.Options.Suggest do
-  @moduledoc "Did-you-mean suggestions for unknown words. Pure."
+  @moduledoc "Suggests what an unknown word may have meant. Pure."
 
   @near_enough 0.77
   # Longer words (in bytes) are not compared: nobody means them, and comparing takes time.

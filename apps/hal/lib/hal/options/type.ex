@@ -1,6 +1,6 @@
 defmodule Hal.Options.Type do
   @moduledoc """
-  The types of an option in a table of `Hal.Options`: what they accept and return. Pure.
+  Reads the values of options by their types in a table of `Hal.Options`: what these accept and return. Pure.
 
   | type | accepts | returns |
   |---|---|---|
@@ -51,9 +51,9 @@ defmodule Hal.Options.Type do
       iex> Hal.Options.Type.read({:keys, size: {:number, 0, 2, "m"}}, size: 1)
       {:ok, [size: 1.0]}
       iex> Hal.Options.Type.read({:list, {:integer, 0, 15}}, [3, 16])
-      {:error, [{["2"], "cannot be 16: a whole number from 0 to 15 is allowed"}]}
+      {:error, [{["2"], "expected a whole number from 0 to 15, got 16"}]}
       iex> Hal.Options.Type.read({:one_of, [:manual, :auto]}, :manaul)
-      {:error, [{[], "cannot be :manaul: :manual or :auto is allowed; did you mean :manual?"}]}
+      {:error, [{[], "expected :manual or :auto, got :manaul; did you mean :manual?"}]}
       iex> Hal.Options.Type.read({:keys, length: {:number, 0.1, 2.0}, lid: :boolean}, [{"lenght", 3}])
       {:error, [{["lenght"], "is not known: allowed are length, lid; did you mean length?"}]}
   """
@@ -171,7 +171,7 @@ defmodule Hal.Options.Type do
 
   defp find([type | settings], []) do
     if settings[:required],
-      do: {:error, [{[], "is missing: #{Wording.allowed(type)} is allowed"}]},
+      do: {:error, [{[], "is missing: expected #{Wording.expected(type)}"}]},
       else: :absent
   end
 

@@ -1,5 +1,5 @@
 defmodule Hal.Options.Wording do
-  @moduledoc "The wording of errors in options: what is wrong, and what is allowed. Pure."
+  @moduledoc "Words the errors in options: what was expected, and what came instead. Pure."
   alias Hal.Options.Suggest
 
   @longest 80
@@ -10,8 +10,12 @@ defmodule Hal.Options.Wording do
   @spec refuse(Hal.Options.Type.t() | String.t(), term()) :: {:error, [problem(), ...]}
   def refuse(type, value) do
     hint = with({:one_of, values} <- type, do: Suggest.hint(show(value), values), else: (_ -> ""))
-    {:error, [{[], "cannot be #{show(value)}: #{allowed(type)} is allowed#{hint}"}]}
+    {:error, [{[], "expected #{expected(type)}, got #{show(value)}#{hint}"}]}
   end
+
+  @doc "What a type accepts, at the end of a phrase."
+  @spec expected(Hal.Options.Type.t() | String.t()) :: String.t()
+  def expected(type), do: String.trim_trailing(allowed(type), ",")
 
   @doc """
   What a type accepts, in words.

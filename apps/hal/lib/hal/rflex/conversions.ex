@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Conversions do
   @moduledoc """
-  A robot's conversions between the controller's units and ours. They differ between robots of one
-  model by 7 % and more, so only the wheels' ratio has a default, and a robot that lacks one that
-  it needs does not arm. Pure.
+  Holds a robot's conversions between the controller's units and ours. They differ between robots of one model by 7 %
+  and more, so only the wheels' ratio has a default, and a robot that lacks one that it needs does not arm. Pure.
 
   | name | units |
   |---|---|

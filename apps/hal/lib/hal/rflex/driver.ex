@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Driver do
   @moduledoc """
-  The driver of a base with an rFLEX controller on a serial line. `Hal.Device` runs it.
+  Drives a base with an rFLEX controller on a serial line. `Hal.Device` runs it.
 
   | option | allowed | default |
   |---|---|---|

@@ -1,7 +1,7 @@
 defmodule Hal.RFlex.Options do
   @moduledoc """
-  The options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that
-  follow from the body (`Hal.RFlex.Sensors.Layout`). Pure.
+  Checks the options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that follow from the
+  body (`Hal.RFlex.Sensors.Layout`). Pure.
   """
   alias Hal.{Options, Profile, Serial}
   alias Hal.Drive.SlewLimiter
@@ -86,7 +86,7 @@ defmodule Hal.RFlex.Options do
   Checks the options; the error is one line that says what is wrong.
 
       iex> Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [distance: -1])
-      {:error, "rflex option conversions.distance cannot be -1: a number from 0.001 to 1.0e7 units per metre is allowed"}
+      {:error, "rflex option conversions.distance: expected a number from 0.001 to 1.0e7 units per metre, got -1"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do

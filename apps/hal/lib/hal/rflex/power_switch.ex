@@ -59,7 +59,7 @@ defmodule Hal.RFlex.PowerSwitch do
   Checks the options and adds the defaults.
 
       iex> Hal.RFlex.PowerSwitch.options(port: "/dev/ttyS0", phrase: "")
-      {:error, "console option phrase cannot be \\"\\": text of 1 to 80 printable ASCII characters is allowed"}
+      {:error, "console option phrase: expected text of 1 to 80 printable ASCII characters, got \\"\\""}
   """
   @spec options(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def options(options), do: Options.check(options, @table, "console")

@@ -1,7 +1,6 @@
 defmodule Hal.RFlex.Reception do
   @moduledoc """
-  The reception of a driver: turns bytes from the line into readings. Time is passed in, in
-  milliseconds.
+  Turns bytes from a driver's line into readings. Time is passed in, in milliseconds.
   """
   alias Hal.RFlex.{Driver, Readings}
   alias Hal.RFlex.Protocol.Decoder

@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Speeds do
   @moduledoc """
-  The speeds that a driver sends to the wheels: the requested speed, limited
-  (`Hal.Drive.SlewLimiter`), repeated, and after a release of the brake. Pure; time is passed in,
-  in milliseconds.
+  Sends speeds to the wheels for a driver: the requested speed, limited (`Hal.Drive.SlewLimiter`), repeated, and after a
+  release of the brake. Pure; time is passed in, in milliseconds.
   """
   alias Hal.Drive.SlewLimiter
   alias Hal.RFlex.{Commands, Driver, Schedule}

@@ -1,9 +1,8 @@
 if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits do
     @moduledoc """
-    A serial line (`Hal.Serial`) through `circuits_uart`, for programs that use it anyway
-    (`MIX_TARGET` other than `host`). Robots with wheels should use `Hal.Serial.Native`, because
-    here **this VM writes the last words**:
+    Opens a serial line (`Hal.Serial`) through `circuits_uart`, for programs that use it anyway (`MIX_TARGET` other than
+    `host`). Robots with wheels should use `Hal.Serial.Native`, because here **this VM writes the last words**:
 
       * when the line is closed, its owner ends or is silent, they are written
       * when the VM itself is killed, frozen or has crashed, they are **not**: the robot goes on

@@ -1,8 +1,7 @@
 defmodule Hal.Serial.Line do
   @moduledoc """
-  The behaviour of an implementation of `Hal.Serial`: `Hal.Serial.Native`, which is always
-  available, or `Hal.Serial.Circuits`, where `circuits_uart` is installed. All functions are
-  called by the process that opened the line.
+  Defines an implementation of `Hal.Serial`: `Hal.Serial.Native`, which is always available, or `Hal.Serial.Circuits`,
+  where `circuits_uart` is installed. All functions are called by the process that opened the line.
   """
 
   @type t :: term()

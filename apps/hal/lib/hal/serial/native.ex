@@ -1,7 +1,7 @@
 defmodule Hal.Serial.Native do
   @moduledoc """
-  A serial line through our own port program (`c_src/serial.c`), which outlives this VM long
-  enough to write the last words. See `Hal.Serial`.
+  Opens a serial line through our own port program (`c_src/serial.c`), which outlives this VM long enough to write the
+  last words. See `Hal.Serial`.
 
   The program keeps the timer of the signs of life. If it is killed itself, by the kernel or by an
   administrator's `kill -9`, there are no last words, and this side sees `{:exit, 137}`.

@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Driver do
   @moduledoc """
-  The driver of the pan-tilt-zoom unit of a Sony EVI-D30, D31, D70 or D100 (`Hal.Visca.Model`) on a
-  serial line, run by `Hal.Device`.
+  Drives the pan-tilt-zoom unit of a Sony EVI-D30, D31, D70 or D100 (`Hal.Visca.Model`) on a serial line, run by
+  `Hal.Device`.
 
       {Hal.Device, kind: :ptz, driver: {Hal.Visca.Driver, port: "/dev/ttyS2"}, sinks: [...]}
 
@@ -70,7 +70,7 @@ defmodule Hal.Visca.Driver do
   Describes an error in words.
 
       iex> Hal.Visca.Driver.explain({:model, 0x0411}, port: "/dev/ttyS2")
-      "/dev/ttyS2: a camera FCB-EX780 (0x0411) answers: EVI-D30, EVI-D70 or EVI-D100 is allowed; model: in the robot file overrides this"
+      "/dev/ttyS2: expected EVI-D30, EVI-D70 or EVI-D100, got a camera FCB-EX780 (0x0411); model: in the robot file overrides this"
   """
   @impl Hal.Ptz
   def explain(reason, options), do: "#{options[:port]}: #{words(reason, options)}"
@@ -88,7 +88,7 @@ defmodule Hal.Visca.Driver do
     do: "the camera refuses to say its model; model: in the robot file names it"
 
   defp words({:model, code}, _options) do
-    "a camera #{Model.words(code)} answers: #{allowed()} is allowed; model: in the robot file overrides this"
+    "expected #{allowed()}, got a camera #{Model.words(code)}; model: in the robot file overrides this"
   end
 
   defp words({:zoom, zoom, key}, _options) do
@@ -127,21 +127,22 @@ defmodule Hal.Visca.Driver do
   def reach(state), do: Session.reach(state.head)
 
   @impl Hal.Ptz
-  def look(pan, tilt, state), do: outward(Session.look(state.head, pan, tilt, now()), state)
+  def look(pan, tilt, state),
+    do: outward(Session.look(state.head, pan, tilt, Hal.Clock.now_ms()), state)
 
   @impl Hal.Ptz
   def zoom(field_of_view, state),
-    do: outward(Session.zoom(state.head, field_of_view, now()), state)
+    do: outward(Session.zoom(state.head, field_of_view, Hal.Clock.now_ms()), state)
 
   @impl Hal.Ptz
   def handle_message({:visca_wake, wake}, %__MODULE__{wake: wake} = state),
-    do: carry_out(Session.tick(state.head, now()), state)
+    do: carry_out(Session.tick(state.head, Hal.Clock.now_ms()), state)
 
   def handle_message({:visca_wake, _old}, state), do: {:ok, [], state}
 
   def handle_message(message, %__MODULE__{} = state) do
     case Serial.handle(state.line, message) do
-      {:data, bytes} -> carry_out(Session.bytes(state.head, bytes, now()), state)
+      {:data, bytes} -> carry_out(Session.bytes(state.head, bytes, Hal.Clock.now_ms()), state)
       {:error, reason} -> {:error, reason, state}
       :unknown -> {:ok, [], state}
     end
@@ -157,7 +158,7 @@ defmodule Hal.Visca.Driver do
     {effects, head} =
       Session.open(
         Keyword.take(options, [:camera, :model, :lens, :poll_ms, :field_of_view]),
-        now()
+        Hal.Clock.now_ms()
       )
 
     case carry_out({effects, head}, %__MODULE__{line: line, head: head}) do
@@ -203,13 +204,16 @@ defmodule Hal.Visca.Driver do
 
       at_ms ->
         wake = make_ref()
-        timer = Process.send_after(self(), {:visca_wake, wake}, max(at_ms, now()), abs: true)
+
+        timer =
+          Process.send_after(self(), {:visca_wake, wake}, max(at_ms, Hal.Clock.now_ms()),
+            abs: true
+          )
+
         %{state | timer: timer, wake: wake}
     end
   end
 
   defp cancel(%{timer: nil}), do: :ok
   defp cancel(%{timer: timer}), do: Process.cancel_timer(timer)
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Model do
   @moduledoc """
-  The cameras that this driver knows, with their units and ranges (Sony's command lists and the
-  translation tables of their D30 mode). Pure.
+  Lists the cameras that this driver knows, with their units and ranges (Sony's command lists and the translation tables
+  of their D30 mode). Pure.
 
   | | code | pan | tilt | zoom | lens | turns at most |
   |---|---|---|---|---|---|---|

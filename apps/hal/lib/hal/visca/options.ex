@@ -41,7 +41,7 @@ defmodule Hal.Visca.Options do
       iex> {options[:speed], options[:poll_ms]}
       {9600, 100}
       iex> Hal.Visca.Options.check(port: "/dev/ttyS2", camera: 8)
-      {:error, "visca option camera cannot be 8: a whole number from 1 to 7 is allowed"}
+      {:error, "visca option camera: expected a whole number from 1 to 7, got 8"}
   """
   @spec check(keyword()) :: {:ok, keyword()} | {:error, String.t()}
   def check(options), do: Options.check(options, @table, "visca")

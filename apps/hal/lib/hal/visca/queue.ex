@@ -116,13 +116,6 @@ defmodule Hal.Visca.Queue do
     |> Enum.min(fn -> nil end)
   end
 
-  @doc "Whether a command of this class waits, or was sent and has no answer yet."
-  @spec pending?(t(), CommandClass.t()) :: boolean()
-  def pending?(%__MODULE__{asked: {command, _, _}} = queue, lane),
-    do: CommandClass.of(command) == lane or pending?(%{queue | asked: nil}, lane)
-
-  def pending?(queue, lane), do: Enum.any?(queue.waiting, &(CommandClass.of(&1) == lane))
-
   # Answers
 
   defp answer({:ack, socket}, %{asked: {command, _, _}} = queue, now_ms) do

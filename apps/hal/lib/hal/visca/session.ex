@@ -1,7 +1,7 @@
 defmodule Hal.Visca.Session do
   @moduledoc """
-  A Sony EVI-D30, D31, D70 or D100 on its line, as a function of bytes, requests and time: what to
-  write, and what the unit reports. Pure; `Hal.Visca.Driver` runs it.
+  Models a Sony EVI-D30, D31, D70 or D100 on its line, as a function of bytes, requests and time: what to write, and
+  what the unit reports. Pure; `Hal.Visca.Driver` runs it.
 
   **Opening**: number the cameras, clear, ask for the model (`Hal.Visca.Model`), ask whether it is
   on (if not: switch it on), ask for the position. A camera that was switched off and on reports it in a
@@ -180,20 +180,6 @@ defmodule Hal.Visca.Session do
     [Queue.wake_ms(head.queue), head.poll_at_ms]
     |> Enum.filter(& &1)
     |> Enum.min(fn -> nil end)
-  end
-
-  @doc """
-  Counts since the opening: bytes that did not belong to a message, messages of other cameras, and
-  positions that were doubted.
-  """
-  @spec counts(t()) :: %{
-          garbage: non_neg_integer(),
-          others: non_neg_integer(),
-          doubts: non_neg_integer()
-        }
-  def counts(%__MODULE__{decoder: decoder, outliers: outliers}) do
-    doubts = if outliers, do: outliers.doubts, else: 0
-    decoder |> Map.take([:garbage, :others]) |> Map.put(:doubts, doubts)
   end
 
   # Opening

@@ -243,7 +243,7 @@ defmodule Hal.Device.ArmingTest do
 
   test "a wrong policy is named" do
     assert_raise ArgumentError,
-                 ~r/arm cannot be :hand: :auto, :manual or :never is allowed/,
+                 ~r/arm: expected :auto, :manual or :never, got :hand/,
                  fn ->
                    Device.start_link(kind: :drive, driver: {Hal.FakeDrive, []}, arm: :hand)
                  end

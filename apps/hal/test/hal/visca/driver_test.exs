@@ -130,7 +130,7 @@ defmodule Hal.Visca.DriverTest do
   test "errors are told as what they are" do
     for {reason, words} <- [
           {{:model, 0x0510},
-           "a camera of the unknown model 0x0510 answers: EVI-D30, EVI-D70 or EVI-D100 is allowed"},
+           "expected EVI-D30, EVI-D70 or EVI-D100, got a camera of the unknown model 0x0510"},
           {{:model, nil}, "refuses to say its model"},
           {{:address, 2}, "camera 2 answers, and camera 1 does not"},
           {{:zoom, 0x2000, :d30}, "its zoom is 0x2000, and that of an EVI-D30 ends at 0x03FF"},
@@ -161,22 +161,22 @@ defmodule Hal.Visca.DriverTest do
 
     for {wrong, words} <- [
           {[], "visca option port is missing"},
-          {[port: 3], "option port cannot be 3"},
-          {[port: "a", lens: {1.0, 0.5}], "option lens cannot be {1.0, 0.5}"},
+          {[port: 3], ~r/option port: expected .*, got 3/},
+          {[port: "a", lens: {1.0, 0.5}], ~r/option lens: expected .*, got \{1\.0, 0\.5\}/},
           {[port: "a", poll_ms: 5],
-           "option poll_ms cannot be 5: a whole number from 50 to 400 ms is allowed"},
-          {[port: "a", speed: -1], "option speed cannot be -1"},
+           "option poll_ms: expected a whole number from 50 to 400 ms, got 5"},
+          {[port: "a", speed: -1], ~r/option speed: expected .*, got -1/},
           {[port: "a", serial: [speed: 3]],
            "option serial.speed is not known: allowed are keep_alive_ms, module"},
           {[port: "a", zoom: 3], "option zoom is not known: allowed are port"},
-          {:what, "visca options cannot be :what"}
+          {:what, ~r/visca options: expected .*, got :what/}
         ] do
       assert {:error, line} = Options.check(wrong)
       assert line =~ words
       refute line =~ "\n"
     end
 
-    assert_raise ArgumentError, ~r/option camera cannot be 9/, fn ->
+    assert_raise ArgumentError, ~r/option camera: expected .*, got 9/, fn ->
       Driver.init(port: link, camera: 9)
     end
   end

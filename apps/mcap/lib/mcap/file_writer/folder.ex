@@ -1,6 +1,6 @@
 defmodule Mcap.FileWriter.Folder do
   @moduledoc """
-  The numbered files of a folder, `run-0001.mcap` and so on, which never exceed a limit together: the oldest are
+  Keeps the numbered files of a folder, `run-0001.mcap` and so on, which never exceed a limit together: the oldest are
   deleted. Files of other names are nobody's business here: they neither count nor are deleted. Pure but for `list/1`.
   """
 

@@ -1,6 +1,7 @@
 defmodule Mcap.Foxglove.Encode do
   @moduledoc """
-  The parts that Foxglove's messages are made of, as JSON. Pure. Metres and radians; times are whole nanoseconds.
+  Encodes the parts that Foxglove's messages are made of, as JSON. Pure. Metres and radians; times are whole
+  nanoseconds.
   """
 
   @type point :: {number(), number()} | {number(), number(), number()}

@@ -1,7 +1,7 @@
 defmodule Mcap.Foxglove.Schemas do
   @moduledoc """
-  The JSON schemas of the messages that `Mcap.Foxglove` makes. Viewers choose the panel by the name. Within what their
-  parser understands: each field has one type, objects list their properties, and there are no references.
+  Lists the JSON schemas of the messages that `Mcap.Foxglove` makes. Viewers choose the panel by the name. Within what
+  their parser understands: each field has one type, objects list their properties, and there are no references.
   """
 
   # `[…]` is an array, `{:object, …}` an object with its fields in order; `{:choice, …}` a number by name.
@@ -139,10 +139,6 @@ defmodule Mcap.Foxglove.Schemas do
       file: :string,
       line: :integer
     ],
-    "foxglove.LaserScan" =>
-      stamp ++
-        [pose: pose, start_angle: :number, end_angle: :number] ++
-        [ranges: [:number], intensities: [:number]],
     "foxglove.Grid" =>
       stamp ++
         [pose: pose, column_count: :integer, cell_size: v2] ++

@@ -1,5 +1,5 @@
 defmodule Mcap.Reader.Chunk do
-  @moduledoc "The bytes of a chunk to its messages, after they were checked. Pure."
+  @moduledoc "Turns the bytes of a chunk into its messages, after they were checked. Pure."
   alias Mcap.Record.Parse
 
   @typedoc "`place` is where the message is in the file, which decides between equal times."

@@ -1,7 +1,7 @@
 defmodule Mcap.Reader.Merge do
   @moduledoc """
-  The messages of a file in order of time, a chunk read when its turn has come. As many chunks are in memory as
-  overlap in time: one, in a file that was written in order.
+  Reads the messages of a file in order of time, a chunk when its turn has come. As many chunks are in memory as overlap
+  in time: one, in a file that was written in order.
   """
   alias Mcap.DamagedError
   alias Mcap.Reader.{Chunk, Source}

@@ -1,7 +1,7 @@
 defmodule Mcap.Reader.Source do
   @moduledoc """
-  An open file of which parts are read. A length that the file claims is believed only as far as the file is long,
-  and up to 256 MiB.
+  Reads parts of an open file. A length that the file claims is believed only as far as the file is long, and up to 256
+  MiB.
   """
 
   @most 0x1000_0000

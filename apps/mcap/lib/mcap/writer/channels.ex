@@ -1,5 +1,5 @@
 defmodule Mcap.Writer.Channels do
-  @moduledoc "The channels and schemas that a writer has: their ids, counted from 1, and their records. Pure."
+  @moduledoc "Holds the channels and schemas that a writer has: their ids, counted from 1, and their records. Pure."
   alias Mcap.Channel
 
   defstruct ids: %{}, schema_ids: %{}, records: %{}

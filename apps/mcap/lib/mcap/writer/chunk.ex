@@ -1,6 +1,6 @@
 defmodule Mcap.Writer.Chunk do
   @moduledoc """
-  The open chunk of a writer: the records of some messages, to be written as one. Pure.
+  Holds the open chunk of a writer: the records of some messages, to be written as one. Pure.
 
   It holds the schema and the channel of its messages itself, so that a whole chunk can be read alone.
   """

@@ -1,7 +1,7 @@
 defmodule Mesh.Distribution.Certs do
   @moduledoc """
-  A fleet's own certificates, for distribution by TLS: a CA, and a key and a certificate for each
-  robot, made by the program `openssl` on the machine of the fleet's owner.
+  Makes a fleet's own certificates, for distribution by TLS: a CA, and a key and a certificate for each robot, made by
+  the program `openssl` on the machine of the fleet's owner.
 
       certs/ca.pem  certs/ca-key.pem            the CA; its key (mode 0600) goes to no robot
       certs/mag1/{ca,cert,key}.pem              goes to mag1

@@ -6,7 +6,7 @@ defmodule Mesh.Distribution.Dialer do
 
   This does not decide whether a node is alive: datagrams do (`Mesh.Protocol.NodeTable`).
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer, Ticker}
   alias Mesh.{Backoff, Options}
   alias Mesh.Protocol.Roster
@@ -54,10 +54,6 @@ defmodule Mesh.Distribution.Dialer do
      }}
   end
 
-  # It has a name that connected nodes can send to, so anything may arrive here.
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
     if node in s.fleet,
@@ -95,8 +91,6 @@ defmodule Mesh.Distribution.Dialer do
 
   def handle_info({:DOWN, monitor, :process, _pid, _reason}, s),
     do: {:noreply, %{s | dialling: Map.delete(s.dialling, monitor)}}
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
 

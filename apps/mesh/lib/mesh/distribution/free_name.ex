@@ -1,7 +1,7 @@
 defmodule Mesh.Distribution.FreeName do
   @moduledoc """
-  The name that a node on this machine can have, for `bin/node`, which asks before Erlang starts: Erlang itself says of a
-  port that is taken only `eaddrinuse`.
+  Finds the name that a node on this machine can have, for `bin/node`, which asks before Erlang starts: Erlang itself
+  says of a port that is taken only `eaddrinuse`.
   """
   alias Mesh.Distribution.Epmd.Peers
 

@@ -4,7 +4,7 @@ defmodule Mesh.Distribution.Libcluster do
   nodes, and connected nodes introduce themselves to each other's mesh. If it crashes, the mesh
   goes on, and it is started again with back-off.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Mesh.Backoff
 
@@ -22,15 +22,8 @@ defmodule Mesh.Distribution.Libcluster do
   def handle_continue(:start, s), do: {:noreply, start(s)}
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
   def handle_info(:start, s), do: {:noreply, start(s)}
   def handle_info({:EXIT, _supervisor, reason}, s), do: {:noreply, later(s, reason)}
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # Not a dependency: `Mesh.Options` has found out whether the module exists. A failed start also
   # sends an `:EXIT`.

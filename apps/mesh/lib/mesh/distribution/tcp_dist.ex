@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.Tcp_dist do
   @moduledoc """
-  Erlang's distribution by TCP, for the addresses of the fleet only (`Mesh.Distribution.Access`):
+  Carries Erlang's distribution by TCP, for the addresses of the fleet only (`Mesh.Distribution.Access`):
 
       -proto_dist Elixir.Mesh.Distribution.Tcp
 

@@ -1,7 +1,7 @@
 defmodule Mesh.Distribution.Tls_dist do
   @moduledoc """
-  Erlang's distribution by TLS, for the addresses of the fleet only (`Mesh.Distribution.Access`): others are refused
-  before the handshake of TLS begins.
+  Carries Erlang's distribution by TLS, for the addresses of the fleet only (`Mesh.Distribution.Access`): others are
+  refused before the handshake of TLS begins.
 
       -proto_dist Elixir.Mesh.Distribution.Tls -ssl_dist_optfile …
 

@@ -1,7 +1,6 @@
 defmodule Mesh.Distribution.Topology do
   @moduledoc """
-  The nodes that a node connects its distribution to. Pure: all nodes compute the same from the
-  known nodes.
+  Chooses the nodes that a node connects its distribution to. Pure: all nodes compute the same from the known nodes.
 
   Up to `full_mesh` nodes, every node connects to every other. Above that, the names in order form
   a ring with chords: each node connects to those 1, n^(1/4), n^(1/2) and n^(3/4) places further

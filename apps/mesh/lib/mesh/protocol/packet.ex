@@ -1,6 +1,6 @@
 defmodule Mesh.Protocol.Packet do
   @moduledoc """
-  One signed datagram. Pure.
+  Encodes one signed datagram. Pure.
 
       "CVY" | version | kind | length of name | name | session | sequence | time | count | addresses | payload | signature
         3        1       1          1                     8         8        8       1      6 each                 16     bytes

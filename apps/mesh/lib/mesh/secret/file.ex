@@ -1,6 +1,6 @@
 defmodule Mesh.Secret.File do
   @moduledoc """
-  The file of a fleet's secret: read only if it is safe, and written for its owner alone.
+  Reads the file of a fleet's secret, only if it is safe, and writes it for its owner alone.
   """
   import Bitwise
 

@@ -19,7 +19,7 @@ defmodule Mesh.Strategy.Gossip do
       _none ->
         group_of = "a group and a port such as {{239, 255, 67, 86}, 4371}, or false,"
         {:error, [{[], text}]} = Wording.refuse(group_of, group)
-        {:error, "multicast #{text}"}
+        {:error, "multicast: #{text}"}
     end
   end
 

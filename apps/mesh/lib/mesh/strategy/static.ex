@@ -71,6 +71,6 @@ defmodule Mesh.Strategy.Static do
 
   defp line(wrong) do
     {:error, [{[], text}]} = Wording.refuse(~s(an address such as "10.0.0.7:4370" (UDP\)), wrong)
-    "peers #{text}"
+    "peers: #{text}"
   end
 end

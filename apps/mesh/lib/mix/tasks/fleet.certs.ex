@@ -19,49 +19,31 @@ defmodule Mix.Tasks.Fleet.Certs do
     * `--help` - this text
   """
   use Mix.Task
+  alias Hal.CommandOutput
   alias Mesh.Distribution.Certs
 
   @switches [fleet: :string, out: :string, force: :boolean, help: :boolean]
   @longest 65_536
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("fleet.certs", fn -> command(words) end)
+  def run(words),
+    do: CommandOutput.run("fleet.certs", words, @moduledoc, [strict: @switches], &certs/2)
 
-  defp command(words) do
-    case OptionParser.parse(words, strict: @switches) do
-      {_options, _names, [{word, _value} | _]} ->
-        refuse("#{word} is not an option; --help lists them")
-
-      {options, names, []} ->
-        run(options, names)
+  defp certs(options, names) do
+    with {:ok, more} <- listed(options[:fleet]),
+         {:ok, names} <- check(Enum.uniq(names ++ more)),
+         folder = options[:out] || "certs",
+         {:ok, ca} <- Certs.ca(folder) do
+      tell("#{folder}/ca.pem", ca)
+      Enum.find_value(names, :ok, &robot(folder, &1, options[:force] || false))
     end
   end
 
-  defp run(options, names) do
-    if options[:help] do
-      Mix.shell().info(@moduledoc)
-    else
-      with {:ok, more} <- listed(options[:fleet]),
-           {:ok, names} <- check(Enum.uniq(names ++ more)),
-           folder = options[:out] || "certs",
-           {:ok, ca} <- Certs.ca(folder) do
-        tell("#{folder}/ca.pem", ca)
-        robots(folder, names, options[:force] || false)
-      else
-        {:error, line} -> refuse(line)
-      end
+  defp robot(folder, name, force?) do
+    with {:ok, done} <- Certs.robot(folder, name, force?) do
+      tell("#{folder}/#{name}", done)
+      nil
     end
-  end
-
-  defp robots(folder, names, force?) do
-    for name <- names do
-      case Certs.robot(folder, name, force?) do
-        {:ok, done} -> tell("#{folder}/#{name}", done)
-        {:error, line} -> refuse(line)
-      end
-    end
-
-    :ok
   end
 
   defp listed(nil), do: {:ok, []}
@@ -87,9 +69,4 @@ defmodule Mix.Tasks.Fleet.Certs do
   end
 
   defp tell(path, done), do: Mix.shell().info("#{path} #{done}")
-
-  defp refuse(line) do
-    Mix.shell().error(line)
-    exit({:shutdown, 1})
-  end
 end

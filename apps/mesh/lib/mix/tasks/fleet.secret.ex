@@ -17,40 +17,21 @@ defmodule Mix.Tasks.Fleet.Secret do
   alias Mesh.Secret
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("fleet.secret", fn -> command(words) end)
-
-  defp command(words) do
-    case OptionParser.parse(words, strict: [force: :boolean, help: :boolean]) do
-      {_options, _files, [{word, _value} | _]} ->
-        refuse("#{word} is not an option; --help lists them")
-
-      {options, files, []} ->
-        run(options, files)
-    end
+  def run(words) do
+    parser = [strict: [force: :boolean, help: :boolean]]
+    Hal.CommandOutput.run("fleet.secret", words, @moduledoc, parser, &make/2)
   end
 
-  defp run(options, files) do
-    cond do
-      options[:help] -> Mix.shell().info(@moduledoc)
-      length(files) > 1 -> refuse("one file, not #{length(files)}: #{Enum.join(files, " ")}")
-      true -> make(List.first(files) || Secret.default_path(), options[:force] || false)
-    end
-  end
+  defp make(_options, [_, _ | _] = files),
+    do: {:error, "one file, not #{length(files)}: #{Enum.join(files, " ")}"}
 
-  defp make(path, force?) do
-    case Secret.create(path, force?) do
-      {:ok, secret} ->
-        Mix.shell().info(
-          "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
-        )
+  defp make(options, files) do
+    path = List.first(files) || Secret.default_path()
 
-      {:error, line} ->
-        refuse(line)
-    end
-  end
-
-  defp refuse(line) do
-    Mix.shell().error(line)
-    exit({:shutdown, 1})
+    with {:ok, secret} <- Secret.create(path, options[:force] || false),
+         do:
+           Mix.shell().info(
+             "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"
+           )
   end
 end

@@ -16,7 +16,7 @@ defmodule Mix.Tasks.Fleet.SecretTest do
   end
 
   test "wrong words are one line" do
-    assert refusal(SecretTask, ["--colour"]) == "--colour is not an option; --help lists them"
+    assert refusal(SecretTask, ["--colour"]) == "unknown option --colour"
     assert refusal(SecretTask, ["one", "two"]) == "one file, not 2: one two"
     SecretTask.run(["--help"])
     assert_received {:mix_shell, :info, ["Creates the secret of a fleet" <> _rest]}

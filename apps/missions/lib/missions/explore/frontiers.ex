@@ -1,7 +1,7 @@
 defmodule Missions.Explore.Frontiers do
   @moduledoc """
-  Frontiers: where what is known to be free meets what is unknown, and how far it is there (Yamauchi 1997). Pure; metres, in
-  the frame of the map.
+  Finds frontiers: where what is known to be free meets what is unknown, and how far it is there (Yamauchi 1997). Pure;
+  metres, in the frame of the map.
 
   They are looked for on squares of 20 cm, each of which is open if the robot has room somewhere in it, narrow if it has some
   but not enough, and unknown if nothing of it is known. A frontier is open, can be reached, and has an unknown

@@ -1,6 +1,6 @@
 defmodule Missions.Explore.Options do
   @moduledoc """
-  The options of the exploration. Pure.
+  Lists the options of the exploration. Pure.
 
   | option | meaning | default |
   |---|---|---|

@@ -1,7 +1,7 @@
 defmodule Missions.Flock.Field do
   @moduledoc """
-  The accelerations of flocking with obstacles and a navigational term (Olfati-Saber 2006, algorithm 3), for one robot at
-  `q` with velocity `p`. Pure; metres, m/s, m/s2.
+  Computes the accelerations of flocking with obstacles and a navigational term (Olfati-Saber 2006, algorithm 3), for
+  one robot at `q` with velocity `p`. Pure; metres, m/s, m/s2.
 
       u = c_a sum phi_a(|q_j - q|_s) n_j + c_v sum a_j (p_j - p)          its neighbours j
         + c_b sum phi_b(|q_k - q|_s) n_k - c_w sum b_k (p n_k) n_k        obstacles k
@@ -122,9 +122,8 @@ defmodule Missions.Flock.Field do
     {scale * dx, scale * dy}
   end
 
-  @doc "The norm of a distance, which is smooth at 0 where the distance itself is not."
-  @spec norm(float()) :: float()
-  def norm(distance), do: (:math.sqrt(1 + @e * distance * distance) - 1) / @e
+  # The norm of a distance, which is smooth at 0 where the distance itself is not.
+  defp norm(distance), do: (:math.sqrt(1 + @e * distance * distance) - 1) / @e
 
   defp s1(z), do: z / :math.sqrt(1 + z * z)
 

@@ -1,6 +1,7 @@
 defmodule Missions.Flock.Members do
   @moduledoc """
-  The members of the flock that a robot hears: who they are, how far they have come, where they tell that they are. Pure.
+  Tracks the members of the flock that a robot hears: who they are, how far they have come, where they tell that they
+  are. Pure.
 
   Each tells once a second which course it has and its leg. Its pose comes with its heartbeats, 5 times a second, in the
   peers of the percept; a robot that is there and tells nothing, or has another course, is no member, but an obstacle.
@@ -59,11 +60,10 @@ defmodule Missions.Flock.Members do
   def together?([], _far), do: true
   def together?([first | rest], far), do: spread([first], rest, far) == []
 
-  @doc "Those that do not hang together with the first."
-  @spec spread([Pose.point()], [Pose.point()], float()) :: [Pose.point()]
-  def spread([], rest, _far), do: rest
+  # Those that do not hang together with the first.
+  defp spread([], rest, _far), do: rest
 
-  def spread([point | more], rest, far) do
+  defp spread([point | more], rest, far) do
     {near, rest} = Enum.split_with(rest, &(Pose.distance(point, &1) <= far))
     spread(near ++ more, rest, far)
   end

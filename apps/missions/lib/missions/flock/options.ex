@@ -1,6 +1,6 @@
 defmodule Missions.Flock.Options do
   @moduledoc """
-  The options of the flock. Pure; metres in the map frame, m/s.
+  Lists the options of the flock. Pure; metres in the map frame, m/s.
 
   | option | meaning | default |
   |---|---|---|

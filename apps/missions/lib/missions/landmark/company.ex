@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Company do
   @moduledoc """
-  The other robots that are not gone, looked through once a tick for all that the mission asks of them. Pure.
+  Looks through the other robots that are not gone, once a tick, for all that the mission asks of them. Pure.
   """
   alias Missions.Landmark.Claim
   alias Swarm.Membership.{Heartbeat, Peers}

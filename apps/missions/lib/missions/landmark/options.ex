@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Options do
   @moduledoc """
-  The options of the landmark mission, checked and completed. Pure.
+  Checks and completes the options of the landmark mission. Pure.
 
   | option | meaning | default |
   |---|---|---|
@@ -34,7 +34,7 @@ defmodule Missions.Landmark.Options do
       iex> Missions.Landmark.Options.check([formation: :wedge, policy: :majority], 4)
       {:ok, [of: 4, formation: {:wedge, 1.0}, policy: :majority]}
       iex> Missions.Landmark.Options.check([assign: :luck], 4)
-      {:error, "landmark option assign cannot be :luck: :chain or :cost is allowed"}
+      {:error, "landmark option assign: expected :chain or :cost, got :luck"}
       iex> Missions.Landmark.Options.check([policy: :majority], nil)
       {:error, "landmark option of is missing: policy :majority needs the number of robots of the fleet, 1 to 1000"}
   """

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Rounds do
   @moduledoc """
-  A robot's part in the rounds of the landmark mission: when it opens one (`.Opening`, `.Challenge`),
-  what it reports (`.Report`), and what follows from the record. Pure.
+  Plays a robot's part in the rounds of the landmark mission: when it opens one (`.Opening`, `.Challenge`), what it
+  reports (`.Report`), and what follows from the record. Pure.
 
   A round is opened for two purposes. `:search`: everybody reports after its scan. `:change`:
   everybody reports at once what it sees now, because the leader is gone, or another robot has

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Shape do
   @moduledoc """
-  The leader's choice of a shape that fits the free space. Pure.
+  Chooses for the leader a shape that fits the free space. Pure.
 
   The shape is the requested one as long as that is possible. Slots that a dead robot's body
   occupies are left out. When followers report that their slots are blocked, and all others stand

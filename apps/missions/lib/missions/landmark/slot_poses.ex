@@ -28,11 +28,10 @@ defmodule Missions.Landmark.SlotPoses do
      ), twist}
   end
 
-  @doc "How far ahead of the leader the landmark stands, in metres."
-  @spec landmark_distance(Reference.t()) :: float()
-  def landmark_distance(%Reference{landmark: nil}), do: @default_distance
+  # How far ahead of the leader the landmark stands, in metres.
+  defp landmark_distance(%Reference{landmark: nil}), do: @default_distance
 
-  def landmark_distance(%Reference{landmark: {lx, ly}, pose: {x, y, _heading}}),
+  defp landmark_distance(%Reference{landmark: {lx, ly}, pose: {x, y, _heading}}),
     do: Pose.distance({x / 1000, y / 1000}, {lx / 1000, ly / 1000})
 
   @doc "The place of the landmark in an anchor, in metres, or `nil`."

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.State do
   @moduledoc """
-  The state of the landmark mission in one robot, and the questions that all parts of the mission
-  ask of it. Pure. The parts' own states are under `leadership`, `follower`, `round`, `sight`.
+  Holds the state of the landmark mission in one robot, and the questions that all parts of the mission ask of it. Pure.
+  The parts' own states are under `leadership`, `follower`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
   alias Missions.Landmark.{Company, EpochFilter, LandmarkTrack}

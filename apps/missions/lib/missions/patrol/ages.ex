@@ -10,10 +10,6 @@ defmodule Missions.Patrol.Ages do
   @typedoc "The points by number, metres."
   @type points :: %{non_neg_integer() => Pose.point()}
 
-  @doc "The greatest age, that of a point that nobody has ever seen."
-  @spec never_ms() :: pos_integer()
-  def never_ms, do: @day_ms
-
   @doc """
   A robot at this pose sees what is nearer than `from` metres.
 

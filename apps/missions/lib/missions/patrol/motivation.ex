@@ -1,6 +1,6 @@
 defmodule Missions.Patrol.Motivation do
   @moduledoc """
-  ALLIANCE's motivations (Parker 1998), for one robot and any number of tasks, numbered from 0. Pure; ms.
+  Computes ALLIANCE's motivations (Parker 1998), for one robot and any number of tasks, numbered from 0. Pure; ms.
 
   Each tick a task's motivation grows by the robot's impatience, and is 0 while its sensors say that there is nothing to
   do, while the robot is at another task, when it hears for the first time that a robot takes this one, and

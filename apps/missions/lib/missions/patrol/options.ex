@@ -1,6 +1,6 @@
 defmodule Missions.Patrol.Options do
   @moduledoc """
-  The options of the patrol, and the points that they mean. Pure; metres in the map frame, seconds.
+  Lists the options of the patrol, and the points that they mean. Pure; metres in the map frame, seconds.
 
   | option | meaning | default |
   |---|---|---|

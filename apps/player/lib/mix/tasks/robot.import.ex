@@ -38,25 +38,9 @@ defmodule Mix.Tasks.Robot.Import do
   @largest 1_048_576
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("robot.import", fn -> command(words) end)
-
-  defp command(words) do
-    case OptionParser.parse(words, strict: @switches, aliases: [o: :out]) do
-      {_options, _files, [{word, nil} | _]} ->
-        refuse("#{word} is not an option; --help lists them")
-
-      {_options, _files, [{word, value} | _]} ->
-        refuse("#{word} cannot be #{value}; --help explains")
-
-      {options, files, []} ->
-        run(options, files)
-    end
-  end
-
-  defp run(options, files) do
-    if options[:help],
-      do: Mix.shell().info(@moduledoc),
-      else: with({:error, line} <- carry_over(options, files), do: refuse(line))
+  def run(words) do
+    parser = [strict: @switches, aliases: [o: :out]]
+    Hal.CommandOutput.run("robot.import", words, @moduledoc, parser, &carry_over/2)
   end
 
   defp carry_over(options, files) do
@@ -132,11 +116,13 @@ defmodule Mix.Tasks.Robot.Import do
 
   defp profile(other) do
     hint = Suggest.hint(other, ["magellan", "atrv_mini"])
-    {:error, "--profile cannot be #{other}: magellan or atrv_mini#{hint}"}
+    {:error, "--profile: expected magellan or atrv_mini, got #{other}#{hint}"}
   end
 
   defp version(version) when version in [nil, 1, 2], do: {:ok, version}
-  defp version(other), do: {:error, "--player cannot be #{other}: 1 for 1.x, 2 for later ones"}
+
+  defp version(other),
+    do: {:error, "--player: expected 1 for 1.x or 2 for later ones, got #{other}"}
 
   defp free(nil, _force), do: :ok
   defp free(_out, true), do: :ok
@@ -197,9 +183,4 @@ defmodule Mix.Tasks.Robot.Import do
 
   # Standard output may hold the robot file.
   defp say(line), do: IO.puts(:stderr, line)
-
-  defp refuse(line) do
-    Mix.shell().error(line)
-    exit({:shutdown, 1})
-  end
 end

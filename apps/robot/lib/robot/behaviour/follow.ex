@@ -48,16 +48,7 @@ defmodule Robot.Behaviour.Follow do
   @options [:target, :velocity, :tolerance, :leave, :heading_tolerance, :speed]
 
   @impl Robot.Behaviour
-  def update(options, state) do
-    if Robot.Behaviour.same?(options, state, @options),
-      do: {__MODULE__, state},
-      else: change(options, state)
-  end
-
-  defp change(options, state) do
-    {_, fresh} = new(state |> Map.take(@options) |> Map.to_list() |> Keyword.merge(options))
-    {__MODULE__, Map.merge(state, Map.take(fresh, @options))}
-  end
+  def update(options, state), do: Robot.Behaviour.change(__MODULE__, options, state, @options)
 
   @impl Robot.Behaviour
   def tick(%{pose: nil}, state),

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Fsm do
   @moduledoc """
-  A finite state machine of behaviours, whose outcomes select the transitions (R11, R12).
+  Runs a finite state machine of behaviours, whose outcomes select the transitions (R11, R12).
 
       Fsm.new(
         start: :search,

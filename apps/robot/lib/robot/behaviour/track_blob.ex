@@ -69,7 +69,7 @@ defmodule Robot.Behaviour.TrackBlob do
     }
 
     if options[:near] > options[:far],
-      do: raise(ArgumentError, "option near cannot be #{options[:near]}: at most far is allowed")
+      do: raise(ArgumentError, "option near: expected at most far, got #{options[:near]}")
 
     {__MODULE__, Enum.into(options, state)}
   end
@@ -80,16 +80,7 @@ defmodule Robot.Behaviour.TrackBlob do
   @options [:colour, :min_share, :near, :far, :max_turn, :speed, :place]
 
   @impl Robot.Behaviour
-  def update(options, state) do
-    if Robot.Behaviour.same?(options, state, @options),
-      do: {__MODULE__, state},
-      else: change(options, state)
-  end
-
-  defp change(options, state) do
-    {_, fresh} = new(state |> Map.take(@options) |> Map.to_list() |> Keyword.merge(options))
-    {__MODULE__, Map.merge(state, Map.take(fresh, @options))}
-  end
+  def update(options, state), do: Robot.Behaviour.change(__MODULE__, options, state, @options)
 
   @impl Robot.Behaviour
   def tick(percept, state) do

@@ -1,8 +1,7 @@
 defmodule Robot.Calibration.Drive do
   @moduledoc """
-  The mission of a robot under calibration: it drives one course (`Robot.Calibration.DriveCourse`)
-  and stands. Options: those of the course, whose legs `legs/1` gives. Its phase is `:driving`,
-  then `:done` or `:blocked`. Pure.
+  Runs the mission of a robot under calibration: it drives one course (`Robot.Calibration.DriveCourse`) and stands.
+  Options: those of the course, whose legs `legs/1` gives. Its phase is `:driving`, then `:done` or `:blocked`. Pure.
   """
   @behaviour Robot.Mission
   alias Robot.Calibration.DriveCourse

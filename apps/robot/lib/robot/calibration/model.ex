@@ -1,6 +1,6 @@
 defmodule Robot.Calibration.Model do
   @moduledoc """
-  A model of a base whose odometry has errors in its wheels. Pure.
+  Models a base whose odometry has errors in its wheels. Pure.
 
   Three numbers, each 1.0 for wheels without error:
 

@@ -1,6 +1,6 @@
 defmodule Robot.Calibration.Umbmark do
   @moduledoc """
-  The formulas of UMBmark. Pure.
+  Computes the formulas of UMBmark. Pure.
 
   Source: J. Borenstein, L. Feng, "Measurement and Correction of Systematic Odometry Errors in
   Mobile Robots", IEEE Transactions on Robotics and Automation 12(6), 1996. A robot drives a

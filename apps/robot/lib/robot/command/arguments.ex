@@ -8,14 +8,14 @@ defmodule Robot.Command.Arguments do
   @greatest 1.0e6
 
   @doc """
-  The value of an argument, or what is allowed for it.
+  The value of an argument, or what for it.
 
       iex> Robot.Command.Arguments.value(:x, "1e3", [])
       {:ok, 1000.0}
       iex> Robot.Command.Arguments.value(:x, "1,5", [])
-      {:error, "a number is allowed, as in 2, -0.5 or 1.0e-3"}
+      {:error, "a number, as in 2, -0.5 or 1.0e-3"}
       iex> Robot.Command.Arguments.value(:name, "mag9", [:mag1, :mag2])
-      {:error, "one of mag1, mag2 is allowed"}
+      {:error, "one of mag1, mag2"}
   """
   @spec value(atom(), String.t(), [atom()]) :: {:ok, term()} | {:error, String.t()}
   def value(:name, text, known) do
@@ -25,18 +25,18 @@ defmodule Robot.Command.Arguments do
     end
   end
 
-  def value(:colour, "", _known), do: {:error, "a colour's name is allowed"}
+  def value(:colour, "", _known), do: {:error, "a colour's name"}
   def value(:colour, text, _known), do: {:ok, text}
-  def value(:mission, "", _known), do: {:error, "a mission's name is allowed"}
+  def value(:mission, "", _known), do: {:error, "a mission's name"}
   def value(:mission, text, _known), do: {:ok, text}
   def value(:options, text, _known), do: {:ok, text}
   def value(:found, "0", _known), do: {:ok, false}
   def value(:found, "1", _known), do: {:ok, true}
-  def value(:found, _text, _known), do: {:error, "0 or 1 is allowed"}
+  def value(:found, _text, _known), do: {:error, "0 or 1"}
 
   def value(name, text, _known) when name in [:size, :seconds] do
     case number(text) do
-      {:ok, least} when least < 0 -> {:error, "a number from 0 is allowed"}
+      {:ok, least} when least < 0 -> {:error, "a number from 0"}
       other -> other
     end
   end
@@ -44,12 +44,12 @@ defmodule Robot.Command.Arguments do
   def value(_name, text, _known), do: number(text)
 
   defp names([]), do: "no robot is known"
-  defp names(known), do: "one of #{Enum.map_join(known, ", ", &Atom.to_string/1)} is allowed"
+  defp names(known), do: "one of #{Enum.map_join(known, ", ", &Atom.to_string/1)}"
 
   defp number(text) do
     if Regex.match?(pattern(), text),
       do: text |> float() |> in_range(),
-      else: {:error, "a number is allowed, as in 2, -0.5 or 1.0e-3"}
+      else: {:error, "a number, as in 2, -0.5 or 1.0e-3"}
   end
 
   # A decimal point in every locale; no infinity and no words.
@@ -84,5 +84,5 @@ defmodule Robot.Command.Arguments do
   end
 
   defp in_range(number) when is_float(number) and abs(number) <= @greatest, do: {:ok, number}
-  defp in_range(_number), do: {:error, "a number from -1000000 to 1000000 is allowed"}
+  defp in_range(_number), do: {:error, "a number from -1000000 to 1000000"}
 end

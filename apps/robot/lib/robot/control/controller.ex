@@ -1,8 +1,7 @@
 defmodule Robot.Control.Controller do
   @moduledoc """
-  One tick of a robot's decisions as a function: the present goal, wrapped in
-  `Robot.Behaviour.Avoid`, the escape from a touched bumper, and rest make wishes; the arbiter
-  chooses one. Pure.
+  Computes one tick of a robot's decisions: the present goal, wrapped in `Robot.Behaviour.Avoid`, the escape from a
+  touched bumper, and rest make wishes; the arbiter chooses one. Pure.
 
   A goal has a tag. Setting a goal with the same tag and module changes the options of the running
   behaviour (for example a target that moves); another tag or module starts afresh. A goal that
@@ -79,7 +78,7 @@ defmodule Robot.Control.Controller do
 
       other ->
         raise ArgumentError,
-              "option profile cannot be #{inspect(other)}: a %Hal.Profile{} is allowed"
+              "option profile: expected a %Hal.Profile{}, got #{inspect(other)}"
     end
   end
 

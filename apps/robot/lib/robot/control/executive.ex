@@ -1,9 +1,8 @@
 defmodule Robot.Control.Executive do
   @moduledoc """
-  Ten times a second: takes a percept from the board, runs a tick of `Robot.Control.Controller`,
-  and sends its wish to the gate and the percept to the pilot. It only casts to other parts of the
-  robot, so none of them can block it; what takes long, such as vision, is a process of its own
-  that writes to the board.
+  Takes a percept from the board ten times a second, runs a tick of `Robot.Control.Controller`, and sends its wish to
+  the gate and the percept to the pilot. It only casts to other parts of the robot, so none of them can block it; what
+  takes long, such as vision, is a process of its own that writes to the board.
 
   A behaviour that hangs blocks the executive. `Robot.Safety.LivenessMonitor` detects that and
   kills it.
@@ -14,7 +13,7 @@ defmodule Robot.Control.Executive do
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
   alias Robot.{Board, Departure, Mission, Names, Percept}
   alias Robot.Control.{Controller, Inbox}
@@ -133,8 +132,6 @@ defmodule Robot.Control.Executive do
     end
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:confirm, _then}, %{held?: true} = s), do: {:noreply, s}
 
@@ -165,8 +162,6 @@ defmodule Robot.Control.Executive do
       do: {:noreply, %{drop(s, then) | held?: false}},
       else: HardenedServer.drop(s)
   end
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   defp hold_on(s), do: %{drop(s, nil) | held?: true}
 
@@ -199,8 +194,6 @@ defmodule Robot.Control.Executive do
 
     {:noreply, schedule(s)}
   end
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp state(%{config: config} = s),
     do: {s.controller, %{looks: config.ptz != nil and not config.dry_run}}

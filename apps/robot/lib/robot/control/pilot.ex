@@ -18,7 +18,7 @@ defmodule Robot.Control.Pilot do
   (`arm: :manual` or `:auto`), and while they may not turn none starts (`Robot.Safety.Readiness`).
   So arming starts no motion.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Robot.{Board, Mission, Names, Percept}
   alias Robot.Control.{Delivery, Executive, Inbox}
@@ -174,8 +174,6 @@ defmodule Robot.Control.Pilot do
   def handle_call({:command, _command} = event, _from, {{module, _phase} = state, data} = s),
     do: answer(go({:hand, module}, event, state, data), s)
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   defp answer({:ok, state, data}, _s), do: {:reply, :ok, {state, data}}
   defp answer(error, s), do: {:reply, error, s}
 
@@ -218,7 +216,6 @@ defmodule Robot.Control.Pilot do
   end
 
   def handle_cast({:command, _command} = event, s), do: {:noreply, hand(event, s)}
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   defp hand(_event, {:idle, _data} = s), do: s
 
@@ -231,8 +228,6 @@ defmodule Robot.Control.Pilot do
   def handle_info({:deliver, delivery, {:command, _command} = event}, s) do
     if Inbox.delivery?(delivery), do: delivered(delivery, event, s), else: HardenedServer.drop(s)
   end
-
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp delivered(%Delivery{reply: {m, f, a}} = delivery, event, {state, data} = s) do
     with :ok <- timely(delivery, data),
@@ -302,7 +297,7 @@ defmodule Robot.Control.Pilot do
         {:error, :no_mission}
 
       not Keyword.keyword?(options) ->
-        {:error, "#{inspect(options, limit: 5)} are not options: [key: value] is allowed"}
+        {:error, "expected options [key: value], got #{inspect(options, limit: 5)}"}
 
       Mission.checks?(module) ->
         Journal.asking(module, data, fn -> Mission.check_options(module, options, nil) end)

@@ -1,6 +1,6 @@
 defmodule Robot.Departure.Note do
   @moduledoc """
-  The file that remembers that a robot has left its start pose (`Robot.Departure`).
+  Keeps the file that remembers that a robot has left its start pose (`Robot.Departure`).
 
   It holds the boot of the machine and the odometry frame whose zero is the start pose. A file of an earlier boot does
   not count: whoever boots the machine puts the robot at its start pose. So does who starts the robot by hand, and who

@@ -52,7 +52,7 @@ defmodule Robot.File.CrossChecks do
     if colour != nil and colour not in names,
       do:
         {["policies", "colour"],
-         "cannot be #{inspect(colour)}: the colours are #{Enum.join(names, ", ")}" <>
+         "expected one of the colours #{Enum.join(names, ", ")}, got #{inspect(colour)}" <>
            Suggest.hint(colour, names)}
   end
 
@@ -67,7 +67,7 @@ defmodule Robot.File.CrossChecks do
   defp limits(%{limits: limits, profile: profile}) do
     for {name, value} <- limits, most = Map.fetch!(profile, name), value > most do
       {["limits", Atom.to_string(name)],
-       "cannot be #{value}: a #{profile.name} can do #{most} at most"}
+       "expected at most #{most}, which a #{profile.name} can do, got #{value}"}
     end
   end
 end

@@ -1,6 +1,6 @@
 defmodule Robot.File.Device do
   @moduledoc """
-  The drivers that a robot file names, such as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
+  Reads the drivers that a robot file names, such as `{Hal.RFlex.Driver, port: "/dev/ttyR0"}`.
 
   A driver is a module of this build that exports the main callback of its kind. It may describe
   its options with `option_table/0`, and check what a table cannot express with `options/1`, which

@@ -1,7 +1,7 @@
 defmodule Robot.File.Map do
   @moduledoc """
-  The map of a robot file: the path of a description as map_server writes it, which is relative to the robot file's folder
-  (`Robot.Navigation.MapFile`).
+  Reads the map of a robot file: the path of a description as map_server writes it, which is relative to the robot
+  file's folder (`Robot.Navigation.MapFile`).
   """
   alias Hal.Options.Type
   alias Hal.Pose
@@ -27,7 +27,7 @@ defmodule Robot.File.Map do
       iex> grid = Robot.Navigation.Grid.new(<<0, 0, 0, 1>>, {4, 1}, 0.5, {0.0, 0.0}, closed?: false)
       iex> map = %Robot.Navigation.MapFile{file: "floor.yaml", grid: grid}
       iex> for x <- [0.2, 1.7], do: Robot.File.Map.start(map, Hal.Pose.new(x, 0.2))
-      [nil, "cannot be {1.7, 0.2}: floor of the map floor.yaml is allowed, and there is a wall"]
+      [nil, "expected floor of the map floor.yaml, got {1.7, 0.2}: there is a wall"]
   """
   @spec start(MapFile.t() | nil, Pose.t()) :: String.t() | nil
   def start(nil, _pose), do: nil
@@ -43,5 +43,5 @@ defmodule Robot.File.Map do
   end
 
   defp refusal(file, {x, y}, why),
-    do: "cannot be {#{x}, #{y}}: floor of the map #{file} is allowed, and #{why}"
+    do: "expected floor of the map #{file}, got {#{x}, #{y}}: #{why}"
 end

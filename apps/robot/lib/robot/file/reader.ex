@@ -17,7 +17,10 @@ defmodule Robot.File.Reader do
   are allowed, so that a file never creates atoms.
   """
 
+  alias Hal.Options.Wording
+
   @largest 65_536
+  @most_lines 40
   @deepest 32
   @largest_angle 36_000
   # Stands for all names while the parser only looks for errors.
@@ -34,6 +37,48 @@ defmodule Robot.File.Reader do
   `{:name, text}`.
   """
   @type quoted :: term()
+
+  @doc """
+  The text of a file of at most 64 kB; the error is one line. `what` is what the file should be.
+
+      iex> Robot.File.Reader.text("no/such.exs", "scenario")
+      {:error, ["no/such.exs: no such file or directory"]}
+  """
+  @spec text(Path.t(), what :: String.t()) :: {:ok, String.t()} | {:error, [String.t(), ...]}
+  def text(path, what \\ "robot file") do
+    # Reading a pipe or a device might never end.
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
+         {:ok, text} <- File.read(path) do
+      {:ok, text}
+    else
+      {:ok, %File.Stat{type: :regular}} ->
+        {:error, ["#{path}: no #{what} is larger than #{div(@largest, 1024)} kB"]}
+
+      {:ok, %File.Stat{type: type}} ->
+        {:error, ["#{path}: is a #{type}, where a file is needed"]}
+
+      {:error, reason} ->
+        {:error, ["#{path}: #{:file.format_error(reason)}"]}
+    end
+  end
+
+  @doc """
+  The problems of a file as lines. A person works through the first ones first; a count of the others is enough.
+
+      iex> Robot.File.Reader.lines([{3, ["arm"], "is missing"}], "mag1.exs")
+      ["mag1.exs:3: arm: is missing"]
+  """
+  @spec lines([{pos_integer(), path :: [String.t()], String.t()}], file :: String.t()) :: [
+          String.t()
+        ]
+  def lines(problems, file) do
+    more = length(problems) - @most_lines
+    lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(&1, file))
+    if more > 0, do: lines ++ ["#{file}: and #{more} problems more"], else: lines
+  end
+
+  defp line({line, [], text}, file), do: "#{file}:#{line}: #{text}"
+  defp line({line, path, text}, file), do: "#{file}:#{line}: #{Wording.path(path)}: #{text}"
 
   @doc """
   The tree of a text, or the first problem with its line.

@@ -1,7 +1,7 @@
 defmodule Robot.File.Schema do
   @moduledoc """
-  All keys of a robot file and their types, as one table of `Hal.Options`. Pure; `docs/robots.md`
-  and `config/robots/template.exs` describe the same keys for people, and tests compare them.
+  Lists all keys of a robot file and their types, as one table of `Hal.Options`. Pure; `docs/robots.md` and
+  `config/robots/template.exs` describe the same keys for people, and tests compare them.
   """
   alias Hal.{Pose, Profile}
   alias Hal.Options.Type

@@ -30,7 +30,7 @@ defmodule Robot.File.Terms do
       {:error, [
         {1, ["lenght"], "is not known: allowed are length, width; did you mean length?"},
         {2, ["width"], "is given twice, first in line 2"},
-        {2, ["width"], "cannot be 900: a number from 0.1 to 2.0 m is allowed"}]}
+        {2, ["width"], "expected a number from 0.1 to 2.0 m, got 900"}]}
   """
   @spec check(Reader.tree(), Type.t()) :: {:ok, term()} | {:error, [problem(), ...]}
   def check(tree, type) do

@@ -39,7 +39,7 @@ defmodule Robot.Mission.Claim do
     case claims(mission) do
       nil -> nil
       {version, said} when version in 1..@latest and is_atom(said) -> struct_fault(said)
-      other -> "claims/0 returned #{inspect(other)}: {version, module of a struct} is allowed"
+      other -> "claims/0: expected {version, module of a struct}, got #{inspect(other)}"
     end
   end
 

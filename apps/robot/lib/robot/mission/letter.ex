@@ -1,6 +1,6 @@
 defmodule Robot.Mission.Letter do
   @moduledoc """
-  A message of a mission's own kind, and the door through which messages reach a mission. Pure.
+  Carries a message of a mission's own kind, and checks what reaches a mission. Pure.
 
   A mission names the messages that it hears, with a table of `Hal.Options` for each kind of its own
   (`c:Robot.Mission.messages/0`). It says one by the effect `{:tell, to, kind, fields}`, and hears

@@ -1,7 +1,7 @@
 defmodule Robot.Mission.Runner do
   @moduledoc """
-  The life cycle of a robot's mission as a function: start, events, halt by a stop, resume. Pure
-  if the mission is; `Robot.Control.Pilot` runs it in a process, `Swarm.Member` in lockstep.
+  Runs the life cycle of a robot's mission as a function: start, events, halt by a stop, resume. Pure if the mission is;
+  `Robot.Control.Pilot` runs it in a process, `Swarm.Member` in lockstep.
 
   Events for an idle robot are dropped. The caller carries out the effects, in their order, except
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
@@ -9,6 +9,7 @@ defmodule Robot.Mission.Runner do
   alias Robot.{Mission, Percept}
   alias Robot.Mission.{Claim, Letter}
   alias Robot.Navigation.Grid
+  import Robot.Mission, only: [is_order: 1]
 
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
@@ -93,6 +94,27 @@ defmodule Robot.Mission.Runner do
 
   defp note_tick(runner, {:tick, %{at_ms: at_ms}}), do: %{runner | ticked_ms: at_ms}
   defp note_tick(runner, _event), do: runner
+
+  @typedoc "What is left to do for an effect."
+  @type action ::
+          {:obey, Mission.order()}
+          | {:send, to :: atom() | [atom()] | :all, struct()}
+          | {:stage, atom(), map()}
+
+  @doc """
+  What is left to do for an effect that `start/3` or `handle/2` returned: the controller obeys an order, a message is sent, a
+  stage is reported.
+
+      iex> Robot.Mission.Runner.actions({:look, 0.5})
+      [{:obey, {:look, 0.5}}]
+      iex> Robot.Mission.Runner.actions({:claim, %{standing: true}})
+      []
+  """
+  @spec actions(Mission.effect()) :: [action()]
+  def actions(order) when is_order(order), do: [{:obey, order}]
+  # It is kept here.
+  def actions({:claim, _claim}), do: []
+  def actions(action), do: [action]
 
   @doc "What the mission says of itself (`c:Robot.Mission.explain/1`); `[]` for one that says nothing."
   @spec explain(t()) :: [{label :: String.t(), text :: String.t()}]

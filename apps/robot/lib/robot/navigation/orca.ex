@@ -177,7 +177,9 @@ defmodule Robot.Navigation.Orca do
   defp inside?(plane, velocity), do: violation(plane, velocity) <= 1.0e-9
   defp violation({{nx, ny}, offset}, {vx, vy}), do: offset - (nx * vx + ny * vy)
 
-  defp clip({x, y} = vector, top) do
+  @doc "A vector no longer than `top`, in its direction."
+  @spec clip(vector(), float()) :: vector()
+  def clip({x, y} = vector, top) do
     size = :math.sqrt(x * x + y * y)
     if size > top, do: {x * top / size, y * top / size}, else: vector
   end

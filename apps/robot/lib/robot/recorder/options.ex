@@ -1,5 +1,5 @@
 defmodule Robot.Recorder.Options do
-  @moduledoc "The options that people give to `Robot.Recorder`: `record:` of a robot file."
+  @moduledoc "Lists the options that people give to `Robot.Recorder`: `record:` of a robot file."
   alias Hal.Options
 
   @table [
@@ -18,7 +18,7 @@ defmodule Robot.Recorder.Options do
       iex> Robot.Recorder.Options.check(folder: "/tmp")
       {:ok, [limit_mb: 500, pictures: nil, folder: "/tmp"]}
       iex> Robot.Recorder.Options.check(folder: "/tmp", limit_mb: 1)
-      {:error, "record option limit_mb cannot be 1: a whole number from 4 to 1000000 MB is allowed"}
+      {:error, "record option limit_mb: expected a whole number from 4 to 1000000 MB, got 1"}
   """
   @spec check(term()) :: {:ok, keyword()} | {:error, line :: String.t()}
   def check(options), do: Options.check(options, @table, "record")

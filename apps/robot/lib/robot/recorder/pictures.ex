@@ -7,7 +7,7 @@ defmodule Robot.Recorder.Pictures do
   A robot that has no camera, or none yet, is asked again after a second. It belongs to the recorder,
   which starts it and to which it sends `{:picture, robot, %Vision.View.Picture{}}`.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Robot.Names
   alias Vision.View
@@ -39,11 +39,6 @@ defmodule Robot.Recorder.Pictures do
     with %{^robot => ref} when ref != nil <- s.refs, do: View.next(view(robot), ref)
     {:noreply, s}
   end
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:picture, ref, picture}, s) do

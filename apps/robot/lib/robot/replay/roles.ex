@@ -14,10 +14,6 @@ defmodule Robot.Replay.Roles do
   @type t :: {struct(), map()}
   @type result :: {t(), effects :: [term()]}
 
-  @doc "The roles that can be replayed."
-  @spec all() :: [atom()]
-  def all, do: [:gate, :executive, :pilot]
-
   @states [
     gate: {Reflex, :dry_run},
     executive: {Controller, :looks},

@@ -1,8 +1,7 @@
 defmodule Robot.Safety.Gate do
   @moduledoc """
-  The only process that drives the wheels. It receives wishes, and 20 times a second sends the
-  drive what `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for
-  whatever reason, it stops the robot.
+  Drives the wheels; no other process does. It receives wishes, and 20 times a second sends the drive what
+  `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for whatever reason, it stops the robot.
 
   If `Robot.Safety.Reflex` answers `:now`, for example after a touched bumper or a sonar reading
   while the robot moves, the gate does not wait for the next step.
@@ -17,7 +16,7 @@ defmodule Robot.Safety.Gate do
   (`Robot.Safety.DryRun`) it also commands it only to stand, and reports what it would have
   commanded.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
   alias Robot.{Board, Names}
   alias Robot.Trace
@@ -134,8 +133,6 @@ defmodule Robot.Safety.Gate do
     {:noreply, s |> frame(reflex, at_ms) |> react(urgency, at_ms)}
   end
 
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_call({:estop, tell?}, from, s) when is_boolean(tell?) do
     at_ms = heard(s, :estop)
@@ -159,8 +156,6 @@ defmodule Robot.Safety.Gate do
       else: {:reply, :ok, cleared(s, tell?)}
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   defp forgotten(s, then) do
     at_ms = heard(s, :forget)
     {reflex, urgency} = Reflex.forget(s.reflex)
@@ -183,8 +178,6 @@ defmodule Robot.Safety.Gate do
     Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
     {:noreply, s |> step(at_ms) |> schedule()}
   end
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp state(s), do: {s.reflex, %{dry_run: s.config.dry_run}}
 

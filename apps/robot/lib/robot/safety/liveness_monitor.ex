@@ -17,7 +17,7 @@ defmodule Robot.Safety.LivenessMonitor do
   It counts looks instead of measuring time, so that a machine that was suspended, or whose
   processes all run slowly, is not taken for a robot that hangs.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Robot.{Board, Names}
 
@@ -93,12 +93,6 @@ defmodule Robot.Safety.LivenessMonitor do
   end
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
   def handle_info({:look, ref}, %{look: ref} = s) do
     parts =
       for part <- @parts, into: %{} do
@@ -109,8 +103,6 @@ defmodule Robot.Safety.LivenessMonitor do
 
     {:noreply, schedule(%{s | parts: parts})}
   end
-
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   # The mark contains the pid, so that a restarted process counts anew. A part that is being
   # started or has no entry on the board, as a pilot that waits, gets a new mark at each look.

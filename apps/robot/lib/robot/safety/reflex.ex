@@ -1,10 +1,9 @@
 defmodule Robot.Safety.Reflex do
   @moduledoc """
-  The safety limits between a wish and the wheels, as a function. It does not compete with the
-  behaviours' wishes; it limits the wish that won. Pure: `wish/3` and `sense/3` take what
-  happened; `step/2` (every 50 ms) decides what the wheels may do now, and reports why it is less
-  than wished. For a reading that must not wait for the next step `sense/3` returns `:now`; so
-  does `forget/1` while the robot moves.
+  Applies the safety limits between a wish and the wheels, as a function. It does not compete with the behaviours'
+  wishes; it limits the wish that won. Pure: `wish/3` and `sense/3` take what happened; `step/2` (every 50 ms) decides
+  what the wheels may do now, and reports why it is less than wished. For a reading that must not wait for the next step
+  `sense/3` returns `:now`; so does `forget/1` while the robot moves.
 
   The limits, each by its name in `limits`; each of the first four excludes all others:
 

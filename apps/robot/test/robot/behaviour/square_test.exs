@@ -39,7 +39,7 @@ defmodule Robot.Behaviour.SquareTest do
   end
 
   test "a wrong side is refused by name" do
-    assert_raise ArgumentError, ~r/square option side cannot be 99/, fn ->
+    assert_raise ArgumentError, ~r/square option side: expected .*, got 99/, fn ->
       Square.new(side: 99)
     end
   end

@@ -34,7 +34,7 @@ defmodule Robot.Behaviour.VelocityTest do
 
     for junk <- [nil, {1, :east}, {1.0e3, 0}, [0, 1]] do
       assert {:error, line} = Robot.Behaviour.check({Velocity, velocity: junk})
-      assert line =~ "velocity option velocity cannot be"
+      assert line =~ "velocity option velocity: expected"
     end
   end
 end

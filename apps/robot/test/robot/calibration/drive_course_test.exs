@@ -75,10 +75,10 @@ defmodule Robot.Behaviour.DriveCourseTest do
     assert at_ms in 5_000..5_200
     assert {2, 5_100, _pose, _turned} = drive([go: 3.0], blind?: true)
 
-    assert_raise ArgumentError, ~r/option legs cannot be/, fn ->
+    assert_raise ArgumentError, ~r/option legs: expected/, fn ->
       DriveCourse.new(legs: [go: 0])
     end
 
-    assert_raise ArgumentError, ~r/option legs cannot be/, fn -> DriveCourse.new(legs: []) end
+    assert_raise ArgumentError, ~r/option legs: expected/, fn -> DriveCourse.new(legs: []) end
   end
 end

@@ -185,14 +185,14 @@ defmodule Robot.Control.ControllerTest do
   end
 
   test "wrong options say what is allowed" do
-    assert_raise ArgumentError, ~r/option x cannot be :a/, fn -> Goto.new(x: :a, y: 1) end
+    assert_raise ArgumentError, ~r/option x: expected .*, got :a/, fn -> Goto.new(x: :a, y: 1) end
     assert_raise ArgumentError, ~r/option target/, fn -> Follow.new(target: 1) end
 
     assert_raise ArgumentError, ~r/color is not known: allowed are colour/, fn ->
       FindBlob.new(color: "Red")
     end
 
-    assert_raise ArgumentError, ~r/place cannot be 1/, fn -> TrackBlob.new(place: 1) end
+    assert_raise ArgumentError, ~r/place: expected .*, got 1/, fn -> TrackBlob.new(place: 1) end
     assert_raise ArgumentError, ~r/near/, fn -> TrackBlob.new(near: 2.0, far: 1.0) end
     assert_raise ArgumentError, ~r/profile/, fn -> Controller.new([]) end
   end

@@ -31,7 +31,7 @@ defmodule Robot.Control.InboxTest do
     id = robot(:inbox2)
 
     assert Pilot.start(id, Acts.Mission, [1 | 2]) ==
-             {:error, "[1 | 2] are not options: [key: value] is allowed"}
+             {:error, "expected options [key: value], got [1 | 2]"}
 
     assert Pilot.start(id, GenServer, []) == {:error, :no_mission}
     assert parts(id, [:pilot]) |> Enum.all?(&Process.alive?/1)

@@ -28,7 +28,7 @@ defmodule Robot.Mission.ClaimTest do
            "unchecked claims Robot.Mission.ClaimTest.Bare, which lacks valid?/1: whether one from outside makes sense"},
           {__MODULE__.NoStruct, "no_struct claims Enum, which is no struct of this build"},
           {__MODULE__.Odd,
-           "odd claims/0 returned Robot.Mission.ClaimTest.Whole: {version, module of a struct} is allowed"}
+           "odd claims/0: expected {version, module of a struct}, got Robot.Mission.ClaimTest.Whole"}
         ],
         do: assert(Mission.check_options(mission, [], nil) == {:error, line})
   end

@@ -58,7 +58,7 @@ defmodule Robot.Mission.RunnerTest do
     {runner, _} = Runner.start(Runner.new(:mag1), Count, from: 0)
     goal = {Robot.Behaviour.Goto, x: :far, y: 2.0}
 
-    assert_raise ArgumentError, ~r/option x cannot be :far/, fn ->
+    assert_raise ArgumentError, ~r/option x: expected .*, got :far/, fn ->
       Runner.handle(runner, {:command, {:goal, goal}})
     end
   end

@@ -101,8 +101,8 @@ defmodule Robot.Navigation.MapFileTest do
            ~r/has floor on 101 x 101 m: up to 100 x 100 m, .* are allowed$/},
           {[image: "wide.pgm", resolution: "10"],
            ~r/is 1010.0 x 1010.0 m: 0.1 to 500 m are allowed/},
-          {[resolution: "0"], ~r/map.yaml: resolution cannot be 0: a number from 0.001/},
-          {[resolution: ".nan"], ~r/map.yaml: resolution cannot be .nan: a number from 0.001/},
+          {[resolution: "0"], ~r/map.yaml: resolution: expected a number from 0.001/},
+          {[resolution: ".nan"], ~r/map.yaml: resolution: expected a number from 0.001/},
           {[origin: "[0, 0, 0.5]"], ~r/map.yaml: origin .* is turned/}
         ] do
       assert {:error, line} = dir |> yaml(changes) |> MapFile.open()
@@ -138,15 +138,15 @@ defmodule Robot.Navigation.MapFileTest do
 
     for {map, start, expected} <- [
           {~s("map.yaml"), "{-0.5, 6.25, 0}",
-           "#{path}:3: start: cannot be {-0.5, 6.25}: floor of the map #{map} is allowed, and there is a wall"},
+           "#{path}:3: start: expected floor of the map #{map}, got {-0.5, 6.25}: there is a wall"},
           {~s("map.yaml"), "{0, 0, 0}",
-           "#{path}:3: start: cannot be {0.0, 0.0}: floor of the map #{map} is allowed, and it is outside of it"},
+           "#{path}:3: start: expected floor of the map #{map}, got {0.0, 0.0}: it is outside of it"},
           {~s("none.yaml"), "{0, 0, 0}",
            "#{path}:2: map: #{Path.join(dir, "none.yaml")}: no such file or directory"},
           {~s("floor.pgm"), "{0, 0, 0}",
-           "#{path}:2: map: cannot be \"floor.pgm\": nil or the path of a floor plan's description, \"FILE.yaml\", is allowed"},
+           "#{path}:2: map: expected nil or the path of a floor plan's description, \"FILE.yaml\", got \"floor.pgm\""},
           {":known", "{0, 0, 0}",
-           "#{path}:2: map: cannot be :known: nil or the path of a floor plan's description, \"FILE.yaml\", is allowed"}
+           "#{path}:2: map: expected nil or the path of a floor plan's description, \"FILE.yaml\", got :known"}
         ],
         do: assert(load.(map, start) == {:error, [expected]})
   end

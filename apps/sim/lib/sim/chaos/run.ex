@@ -1,5 +1,5 @@
 defmodule Sim.Chaos.Run do
-  @moduledoc "One run of `mix chaos` from its options to its violations. Pure."
+  @moduledoc "Plays one run of `mix chaos` from its options to its violations. Pure."
   alias Sim.Chaos.{Invariants, Violation}
   alias Sim.Trial
 

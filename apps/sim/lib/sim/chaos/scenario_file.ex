@@ -1,7 +1,7 @@
 defmodule Sim.Chaos.ScenarioFile do
   @moduledoc """
-  A failing run as a scenario (`Sim.Scenario`): its text says what was violated, and it expects that it
-  is not, where scenarios have a word for it. Pure.
+  Writes a failing run as a scenario (`Sim.Scenario`): its text says what was violated, and it expects that it is not,
+  where scenarios have a word for it. Pure.
   """
   alias Sim.Chaos.{Runner, Violation}
   alias Sim.Scenario

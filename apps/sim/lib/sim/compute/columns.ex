@@ -1,6 +1,6 @@
 defmodule Sim.Compute.Columns do
   @moduledoc """
-  One column of a picture at a time, in plain Elixir: the reference for `paint.c`. Pure.
+  Paints one column of a picture at a time, in plain Elixir: the reference for `paint.c`. Pure.
   """
   alias Sim.Compute.Rays
 

@@ -2,19 +2,7 @@ defmodule Sim.Compute.Native do
   @moduledoc false
   # The kernels in C; `Sim.Compute` documents them. The C code checks every size: wrong terms
   # raise ArgumentError.
-  @on_load :load
-
-  @doc false
-  def load do
-    # Without the library the stubs remain, and the reference does the work.
-    _ = :erlang.load_nif(to_charlist(Application.app_dir(:sim, "priv/kernel")), 0)
-    :ok
-  end
-
-  @spec loaded?() :: boolean()
-  # The library replaces this. From a plain `false`, compilers that infer types would conclude
-  # that it is never loaded.
-  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
+  use Hal.Nif, app: :sim, library: "kernel"
 
   @spec field(binary(), pos_integer(), pos_integer()) :: binary()
   def field(_walls, _width, _height), do: :erlang.nif_error(:nif_not_loaded)

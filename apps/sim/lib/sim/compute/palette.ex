@@ -1,7 +1,7 @@
 defmodule Sim.Compute.Palette do
   @moduledoc """
-  The colours of simulated objects: their paint, the colour class they match, and the relation of
-  their blobs to distance. Pure.
+  Lists the colours of simulated objects: their paint, the colour class they match, and the relation of their blobs to
+  distance. Pure.
   """
 
   @enforce_keys [:name, :paint, :rgb, :thresholds, :constant]

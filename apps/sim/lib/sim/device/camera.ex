@@ -1,10 +1,9 @@
 defmodule Sim.Device.Camera do
   @moduledoc """
-  The camera of a robot in a simulated world. It paints its pictures in its own process, from what
-  the server sends: the static ground once, and then what moves (`Sim.World.CameraView`). Options:
-  `world`, `robot` as for `Sim.Device.Drive`; `clock`, the robot's clock, which gives pictures
-  their time; `blobs: :direct` for a camera that computes blobs by geometry and never paints: for
-  many robots on few processors.
+  Simulates the camera of a robot in a simulated world. It paints its pictures in its own process, from what the server
+  sends: the static ground once, and then what moves (`Sim.World.CameraView`). Options: `world`, `robot` as for
+  `Sim.Device.Drive`; `clock`, the robot's clock, which gives pictures their time; `blobs: :direct` for a camera that
+  computes blobs by geometry and never paints: for many robots on few processors.
   """
   @behaviour Hal.Camera
   alias Sim.World

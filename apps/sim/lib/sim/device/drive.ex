@@ -1,11 +1,11 @@
 defmodule Sim.Device.Drive do
   @moduledoc """
-  The wheels, sonars and bumpers of a robot in a simulated world. Options: `world` (its name),
-  `robot`. Until the world is up, and after it has ended, the error is `{:error, :no_world}`.
+  Simulates the wheels, sonars and bumpers of a robot in a simulated world. Options: `world` (its name), `robot`. Until
+  the world is up, and after it has ended, the error is `{:error, :no_world}`.
   """
   @behaviour Hal.Drive
   alias Hal.Twist
-  alias Sim.{Lateness, World}
+  alias Sim.World
 
   @impl Hal.Drive
   def init(options) do
@@ -30,18 +30,7 @@ defmodule Sim.Device.Drive do
   end
 
   @impl Hal.Drive
-  def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = drive) do
-    {late?, least} = Lateness.late?(drive.least, sent_ms, System.monotonic_time(:millisecond))
-    {:ok, if(late?, do: [], else: all), %{drive | least: least}}
-  end
-
-  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = drive),
-    do: {:error, reason, drive}
-
-  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = drive),
-    do: {:error, :no_world, drive}
-
-  def handle_message(_other, drive), do: {:ok, [], drive}
+  defdelegate handle_message(message, drive), to: Sim.Device
 
   @impl Hal.Drive
   def terminate(drive), do: World.Server.detach(drive.line, drive.robot, :drive)

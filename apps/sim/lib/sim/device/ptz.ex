@@ -1,7 +1,7 @@
 defmodule Sim.Device.Ptz do
-  @moduledoc "The pan-tilt unit of a robot in a simulated world. Options as for `Sim.Device.Drive`."
+  @moduledoc "Simulates the pan-tilt unit of a robot in a simulated world. Options as for `Sim.Device.Drive`."
   @behaviour Hal.Ptz
-  alias Sim.{Lateness, World}
+  alias Sim.World
 
   @impl Hal.Ptz
   def init(options) do
@@ -25,18 +25,7 @@ defmodule Sim.Device.Ptz do
   end
 
   @impl Hal.Ptz
-  def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = ptz) do
-    {late?, least} = Lateness.late?(ptz.least, sent_ms, System.monotonic_time(:millisecond))
-    {:ok, if(late?, do: [], else: all), %{ptz | least: least}}
-  end
-
-  def handle_message({:world, server, {:error, reason}}, %{line: {server, _}} = ptz),
-    do: {:error, reason, ptz}
-
-  def handle_message({:DOWN, monitor, _, _, _}, %{line: {_, monitor}} = ptz),
-    do: {:error, :no_world, ptz}
-
-  def handle_message(_other, ptz), do: {:ok, [], ptz}
+  defdelegate handle_message(message, ptz), to: Sim.Device
 
   @impl Hal.Ptz
   def terminate(ptz), do: World.Server.detach(ptz.line, ptz.robot, :ptz)

@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.Core do
   @moduledoc """
-  A device at the other end of a serial line, as a pure function of bytes, time and what its body
-  senses. `Sim.Emulator` runs it on a pseudo-terminal. Times are whole milliseconds of one clock,
-  and never go back.
+  Defines a device at the other end of a serial line, as a pure function of bytes, time and what its body senses.
+  `Sim.Emulator` runs it on a pseudo-terminal. Times are whole milliseconds of one clock, and never go back.
   """
 
   @type core :: term()

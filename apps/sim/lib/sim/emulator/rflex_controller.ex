@@ -1,8 +1,8 @@
 defmodule Sim.Emulator.RFlexController do
   @moduledoc """
-  The controller of a Magellan Pro or an ATRV mini at the other end of the serial line, written from the fact sheet
-  alone. Pure: bytes and time in, bytes and the wheels' speed out; `Sim.Emulator` runs it on a pseudo-terminal with
-  a body in a simulated world. Its options are those of `Sim.Emulator.RFlexController.Options`.
+  Emulates the controller of a Magellan Pro or an ATRV mini at the other end of the serial line, written from the fact
+  sheet alone. Pure: bytes and time in, bytes and the wheels' speed out; `Sim.Emulator` runs it on a pseudo-terminal
+  with a body in a simulated world. Its options are those of `Sim.Emulator.RFlexController.Options`.
 
   It reports nothing unless it was asked to, and silently skips errors on the line. The text
   `:phrase`, anywhere on the line, switches it off until it is switched on again.

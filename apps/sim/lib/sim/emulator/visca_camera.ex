@@ -1,9 +1,8 @@
 defmodule Sim.Emulator.ViscaCamera do
   @moduledoc """
-  A Sony EVI-D30 at the other end of the serial line, written from the fact sheet alone. Pure:
-  bytes and time in, bytes and direction of view out; `Sim.Emulator` runs it on a pseudo-terminal,
-  and the camera of a body in a simulated world looks where it looks. Its options are those of
-  `Sim.Emulator.ViscaCamera.Options`.
+  Emulates a Sony EVI-D30 at the other end of the serial line, written from the fact sheet alone. Pure: bytes and time
+  in, bytes and direction of view out; `Sim.Emulator` runs it on a pseudo-terminal, and the camera of a body in a
+  simulated world looks where it looks. Its options are those of `Sim.Emulator.ViscaCamera.Options`.
 
   Two commands are carried out at a time. Where the sheet leaves it open: the answer that a
   command cannot be executed names the socket that the command would have had; a second move

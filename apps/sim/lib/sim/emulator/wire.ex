@@ -1,8 +1,8 @@
 defmodule Sim.Emulator.Wire do
   @moduledoc """
-  One direction of an imperfect serial line: bytes are lost, duplicated, delayed, or have one bit
-  flipped; and the line can be unplugged. Pure: what happens to the n-th byte is a hash of the
-  seed, the direction and n (`Sim.Noise`), so the same bytes meet the same faults again.
+  Simulates one direction of an imperfect serial line: bytes are lost, duplicated, delayed, or have one bit flipped; and
+  the line can be unplugged. Pure: what happens to the n-th byte is a hash of the seed, the direction and n
+  (`Sim.Noise`), so the same bytes meet the same faults again.
 
   | option | allowed | default |
   |---|---|---|
@@ -39,13 +39,13 @@ defmodule Sim.Emulator.Wire do
       iex> wire.flip
       0.0
       iex> Sim.Emulator.Wire.new(drop: 2)
-      {:error, "wire option drop cannot be 2: a number from 0 to 1 is allowed"}
+      {:error, "wire option drop: expected a number from 0 to 1, got 2"}
   """
   @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
   def new(options \\ []) do
     with {:ok, options} <- Options.check(options, @table, "wire") do
       if options[:drop] + options[:double] + options[:flip] > 1,
-        do: {:error, "wire options drop, double and flip cannot be more than 1 together"},
+        do: {:error, "wire options drop, double and flip: expected at most 1 together"},
         else: {:ok, struct!(__MODULE__, options)}
     end
   end

@@ -1,8 +1,7 @@
 defmodule Sim.Fleet.Hardware do
   @moduledoc """
-  Robots of a simulated fleet with the drivers of real ones: each has a base and a camera,
-  emulated on pseudo-terminals whose links are in the run's folder (`mag1.base`, `mag1.camera`),
-  with the robot's body in the world behind them.
+  Gives robots of a simulated fleet the drivers of real ones: each has a base and a camera, emulated on pseudo-terminals
+  whose links are in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in the world behind them.
 
       supervisor (one_for_one: a device that crashes was, in effect, switched off and on)
       `-- Sim.Emulator   two for each such robot

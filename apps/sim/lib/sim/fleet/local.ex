@@ -1,6 +1,6 @@
 defmodule Sim.Fleet.Local do
   @moduledoc """
-  World and robots on this node: each robot the whole tree of `Robot.Supervisor`.
+  Runs world and robots on this node: each robot the whole tree of `Robot.Supervisor`.
 
       supervisor (one_for_all, no restarts: a fleet cannot exist without its world)
       |-- Sim.World.Directory     unless another fleet of this node has it already

@@ -1,8 +1,8 @@
 defmodule Sim.Fleet.Mission do
   @moduledoc """
-  The option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start
-  it; a name (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`.
-  Pure, except that it loads the module.
+  Reads the option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start it; a name
+  (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`. Pure, except that
+  it loads the module.
   """
   alias Sim.Trial.Setup
   alias Swarm.Missions
@@ -14,9 +14,9 @@ defmodule Sim.Fleet.Mission do
   The setup with that mission, and whether the mission should start; the error is one line.
 
       iex> Sim.Fleet.Mission.choose(%{mission: nil}, {NoSuchModule, []}, false)
-      {:error, "mission cannot be {NoSuchModule, []}: NoSuchModule is not a Robot.Mission (init/2 and handle/2)"}
+      {:error, "mission: expected a Robot.Mission (init/2 and handle/2), got {NoSuchModule, []}"}
       iex> {:error, line} = Sim.Fleet.Mission.choose(%{mission: nil, robots: [:mag1]}, :landmrk, false)
-      iex> line =~ ~r/^mission :landmrk is not known; .*landmark.* allowed; did you mean :landmark\\?$/
+      iex> line =~ ~r/^mission :landmrk is not known; .*landmark.*; did you mean :landmark\\?$/
       true
   """
   @spec choose(Setup.t(), term(), nodes? :: boolean()) ::
@@ -35,17 +35,15 @@ defmodule Sim.Fleet.Mission do
              do: choose(setup, chosen, nodes?)
 
       not Keyword.keyword?(options) ->
-        {:error, "mission cannot be #{brief(mission)}: its options must be [key: value]"}
+        {:error, "mission: expected options [key: value], got #{brief(mission)}"}
 
       not mission?(module) ->
-        {:error,
-         "mission cannot be #{brief(mission)}: #{inspect(module)} is not a Robot.Mission " <>
-           "(init/2 and handle/2)"}
+        {:error, "mission: expected a Robot.Mission (init/2 and handle/2), got #{brief(mission)}"}
 
       nodes? and Application.get_application(module) not in @apps ->
         {:error,
-         "mission cannot be #{brief(mission)} with nodes: processes of their own have the " <>
-           "modules of #{Enum.join(@apps, ", ")} only"}
+         "mission: expected a module of #{Enum.join(@apps, ", ")}, as processes of their own have only " <>
+           "these, got #{brief(mission)}"}
 
       true ->
         {:ok, %{setup | mission: mission}, true}
@@ -54,8 +52,7 @@ defmodule Sim.Fleet.Mission do
 
   def choose(_setup, other, _nodes?),
     do:
-      {:error,
-       "mission cannot be #{brief(other)}: true, false, a name or {module, options} is allowed"}
+      {:error, "mission: expected true, false, a name or {module, options}, got #{brief(other)}"}
 
   defp mission?(module) do
     Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.Nodes do
   @moduledoc """
-  World and robots, each in a process of the operating system of its own (`Sim.Node`), on
-  loopback; this one, the launcher, starts them and listens to them.
+  Runs world and robots, each in a process of the operating system of its own (`Sim.Node`), on loopback; this one, the
+  launcher, starts them and listens to them.
 
   A robot whose process ends, whoever killed it, is dead. One that sends nothing, perhaps because
   it is frozen, is `:silent` until it sends again. When the world's process ends, it is started
@@ -57,7 +57,7 @@ defmodule Sim.Fleet.Nodes do
   end
 
   # As long as nodes come up one after the other, the machine is only slow.
-  defp await_all(backend, ids, deadline \\ now() + @up_ms) do
+  defp await_all(backend, ids, deadline \\ Hal.Clock.now_ms() + @up_ms) do
     case Enum.filter(ids, &(backend.children[&1].up == nil)) do
       [] ->
         {:ok, backend}
@@ -76,7 +76,7 @@ defmodule Sim.Fleet.Nodes do
           {port, {:exit_status, _status}} when is_port(port) ->
             {:error, fallen(backend, port), backend}
         after
-          max(deadline - now(), 0) -> {:error, late(backend, hd(missing)), backend}
+          max(deadline - Hal.Clock.now_ms(), 0) -> {:error, late(backend, hd(missing)), backend}
         end
     end
   end
@@ -108,7 +108,7 @@ defmodule Sim.Fleet.Nodes do
 
   @impl Sim.Fleet.Backend
   def claims(backend) do
-    now = now()
+    now = Hal.Clock.now_ms()
 
     for id <- living(backend) do
       case backend.reports[id] do
@@ -212,7 +212,7 @@ defmodule Sim.Fleet.Nodes do
     do: {:ok, [], %{backend | world: Snapshot.onto(backend.setup.world, snapshot)}}
 
   defp heard(backend, id, {:report, {claim, counts}}),
-    do: {:ok, [], put_in(backend.reports[id], {claim, counts, now()})}
+    do: {:ok, [], put_in(backend.reports[id], {claim, counts, Hal.Clock.now_ms()})}
 
   defp heard(backend, id, {:stage, %{robot: id, stage: stage} = about}) do
     {:ok, [{:stage, stage, id, Map.drop(about, [:robot, :stage])}], begun(backend, id, stage)}
@@ -223,7 +223,7 @@ defmodule Sim.Fleet.Nodes do
   # Its next report will say so; until then the run log must not consider the search finished.
   defp begun(backend, id, :search) do
     {claim, counts, _at_ms} = Map.get(backend.reports, id, {%{}, %{}, 0})
-    put_in(backend.reports[id], {Map.put(claim, :phase, :search), counts, now()})
+    put_in(backend.reports[id], {Map.put(claim, :phase, :search), counts, Hal.Clock.now_ms()})
   end
 
   defp begun(backend, _id, _stage), do: backend
@@ -287,6 +287,4 @@ defmodule Sim.Fleet.Nodes do
        seed: options.seed + index
      }}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

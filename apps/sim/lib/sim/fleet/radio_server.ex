@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.RadioServer do
   @moduledoc """
-  Two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at
-  once, and one that loses and delays messages by `Sim.Radio`.
+  Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
+  that loses and delays messages by `Sim.Radio`.
   """
   use GenServer
   alias Robot.Names
@@ -49,9 +49,8 @@ defmodule Sim.Fleet.RadioServer do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, Radio.new(options))
 
-  @doc "The transport of a radio."
-  @spec transport(pid()) :: {module(), atom(), list()}
-  def transport(air), do: {__MODULE__, :transmit, [air]}
+  # The transport of a radio.
+  defp transport(air), do: {__MODULE__, :transmit, [air]}
 
   @doc false
   @spec transmit(pid(), atom(), :all | [atom()], Swarm.Message.t()) :: :ok
@@ -72,14 +71,14 @@ defmodule Sim.Fleet.RadioServer do
 
   @impl GenServer
   def handle_cast({:transmit, from, to, message}, s),
-    do: {:noreply, poll(%{s | radio: Radio.send(s.radio, now(), from, to, message)})}
+    do: {:noreply, poll(%{s | radio: Radio.send(s.radio, Hal.Clock.now_ms(), from, to, message)})}
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Map.take(s.radio, [:sent, :lost]), s}
 
   @impl GenServer
   def handle_info(:poll, s) do
-    {letters, radio} = Radio.receive(s.radio, now())
+    {letters, radio} = Radio.receive(s.radio, Hal.Clock.now_ms())
     for {to, _from, message} <- letters, do: deliver(to, message)
     {:noreply, poll(%{s | radio: radio, polling?: false})}
   end
@@ -105,6 +104,4 @@ defmodule Sim.Fleet.RadioServer do
       true -> :ok
     end
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,5 +1,5 @@
 defmodule Sim.Fleet.Robot do
-  @moduledoc "One robot of a simulated fleet on this node: its config, its start, its claims."
+  @moduledoc "Configures and starts one robot of a simulated fleet on this node, and reads its claims."
   alias Robot.Board
   alias Robot.Control.Pilot
   alias Sim.Fleet.Hardware

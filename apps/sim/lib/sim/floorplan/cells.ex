@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Cells do
-  @moduledoc "The cells of a map and its places in metres. Pure."
+  @moduledoc "Converts between the cells of a map and its places in metres. Pure."
 
   @doc "Width and height in metres."
   @spec size(Sim.Floorplan.t()) :: {float(), float()}

@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Image do
   @moduledoc """
-  Maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle
-  is the origin; or a description in YAML as map_server writes it, `FILE.yaml`, which names the
-  picture and says where the origin is.
+  Reads maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
+  or a description in YAML as map_server writes it, `FILE.yaml`, which names the picture and says where the origin is.
   """
   alias Robot.Navigation.MapFile
   alias Robot.Navigation.MapFile.Picture
@@ -26,7 +25,7 @@ defmodule Sim.Floorplan.Image do
 
   defp unknown(name) do
     {allowed, hint} = Maps.fault(name)
-    {:error, "unknown map #{name}: #{allowed} is allowed#{hint}"}
+    {:error, "map: expected #{String.trim_trailing(allowed, ",")}, got #{name}#{hint}"}
   end
 
   defp sized(name, [_, file, size]) do

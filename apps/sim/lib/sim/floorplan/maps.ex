@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Maps do
-  @moduledoc "The built-in maps by name. Pure."
+  @moduledoc "Lists the built-in maps by name. Pure."
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps.{Corridors, Halls, Partitions, Rough, Wide}
 

@@ -1,7 +1,7 @@
 defmodule Sim.Floorplan.Rooms do
   @moduledoc """
-  The rooms of a map: areas of places that are far enough from all walls to start there, so that a
-  door ends a room. Pure.
+  Finds the rooms of a map: areas of places that are far enough from all walls to start there, so that a door ends a
+  room. Pure.
   """
   alias Hal.Pose
   alias Robot.Navigation.MapFile.Runs

@@ -1,6 +1,6 @@
 defmodule Sim.Node.Robot do
   @moduledoc """
-  One robot as the part of a node: the same tree as on a node with others.
+  Runs one robot as the part of a node: the same tree as on a node with others.
 
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
       |-- Sim.World.Directory     where the world is

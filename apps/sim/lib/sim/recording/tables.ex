@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Tables do
   @moduledoc """
-  A run as tables for other programs (CSV as in RFC 4180). Pure.
+  Writes a run as tables for other programs (CSV as in RFC 4180). Pure.
 
   | table | a row |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Tick do
   @moduledoc """
-  A tick of a run in the form in which a recording holds it. Pure.
+  Packs a tick of a run into the form in which a recording holds it. Pure.
 
   A recording must cost its run next to nothing, and most of a tick is the same again and again: a
   message is among the effects of its sender and among the inputs of each robot that hears it, and

@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Topics do
   @moduledoc """
-  The topics of a run's recording, and what a tick says on each of them. Pure.
+  Lists the topics of a run's recording, and what a tick says on each of them. Pure.
 
   | topic | what | schema |
   |---|---|---|

@@ -1,6 +1,6 @@
 defmodule Sim.Replay.Cursor do
   @moduledoc """
-  A place in a recorded run, from which one goes forwards and backwards tick by tick. Pure.
+  Holds a place in a recorded run, from which one goes forwards and backwards tick by tick. Pure.
 
   A replay itself goes forwards only. So the cursor keeps its state every few ticks, and goes back
   by going on from the nearest state before. When there are too many, it drops every second one,

@@ -64,7 +64,7 @@ defmodule Sim.Scenario.Expectation do
       iex> Sim.Scenario.Expectation.read({:still, :mag1, from_s: 3, to_s: 9})
       {:ok, {:still, :mag1, [from_s: 3.0, to_s: 9.0]}}
       iex> Sim.Scenario.Expectation.read({:still, :mag1, from_s: 3})
-      {:error, [{["to_s"], "is missing: a number from 0 to 1000000 s is allowed"}]}
+      {:error, [{["to_s"], "is missing: expected a number from 0 to 1000000 s"}]}
       iex> Sim.Scenario.Expectation.read({:phase, :all, :leed, by_s: 9}) |> elem(1) |> hd() |> elem(1) |> String.split("; ") |> List.last()
       "did you mean :lead?"
   """
@@ -80,14 +80,11 @@ defmodule Sim.Scenario.Expectation do
 
     if to_s > from_s,
       do: {:ok, expectation},
-      else:
-        {:error,
-         [{[], "cannot be #{inspect(expectation)}: its end must come after its beginning"}]}
+      else: {:error, [{[], "expected an end after the beginning, got #{inspect(expectation)}"}]}
   end
 
-  @doc "All expectations, as forms of `Sim.Trial.Form`."
-  @spec forms() :: [Form.form()]
-  def forms do
+  # All expectations, as forms of `Sim.Trial.Form`.
+  defp forms do
     robot = {:check, &(is_atom(&1) and &1 not in [nil, true, false, :all]), "a robot of this run"}
 
     who =

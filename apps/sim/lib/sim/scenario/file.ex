@@ -15,13 +15,9 @@ defmodule Sim.Scenario.File do
   file, the line and the key. Wrong names of robots, and times after the end of the run, are found
   once each key by itself is right.
   """
-  alias Hal.Options.Wording
   alias Robot.File.{Reader, Terms}
   alias Sim.Scenario
   alias Sim.Scenario.{Expectation, Names, Text}
-
-  @largest 65_536
-  @most_lines 20
 
   @doc """
   The scenario of the file at `path`, or the problems with it.
@@ -30,22 +26,8 @@ defmodule Sim.Scenario.File do
       {:error, ["no/such.exs: no such file or directory"]}
   """
   @spec load(Path.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
-  def load(path) do
-    # Reading a pipe or a device might never end.
-    with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
-         {:ok, text} <- File.read(path) do
-      parse(text, path)
-    else
-      {:ok, %File.Stat{type: :regular}} ->
-        {:error, ["#{path}: no scenario is larger than #{div(@largest, 1024)} kB"]}
-
-      {:ok, %File.Stat{type: type}} ->
-        {:error, ["#{path}: is a #{type}, where a file is needed"]}
-
-      {:error, reason} ->
-        {:error, ["#{path}: #{:file.format_error(reason)}"]}
-    end
-  end
+  def load(path),
+    do: with({:ok, text} <- Reader.text(path, "scenario"), do: parse(text, path))
 
   @doc """
   The scenario of a text; `name` is the file's in messages.
@@ -54,8 +36,8 @@ defmodule Sim.Scenario.File do
       iex> scenario.expect
       [{:formed, [by_s: 60.0]}]
       iex> Sim.Scenario.File.parse("[robots: 1,\\n script: [{5, {:kil, :mag1}}]]", "a.exs")
-      {:error, ["a.exs:2: script.1: cannot be {:kil, :mag1}: an event is one of kill, move, remove_landmark, tell, " <>
-        "estop, reset, cut, join, loss, freeze, displace, blind, deaf; did you mean kill?"]}
+      {:error, ["a.exs:2: script.1: expected an event, one of kill, move, remove_landmark, tell, " <>
+        "estop, reset, cut, join, loss, freeze, displace, blind, deaf, got {:kil, :mag1}; did you mean kill?"]}
   """
   @spec parse(String.t(), name :: String.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
   def parse(text, name \\ "scenario") do
@@ -70,23 +52,14 @@ defmodule Sim.Scenario.File do
       {:ok, Scenario.build(values)}
     else
       {:error, {line, words}} -> {:error, ["#{name}:#{line}: #{words}"]}
-      {:error, problems} -> {:error, lines(problems, name)}
-      problems -> {:error, lines(problems, name)}
+      {:error, problems} -> {:error, Reader.lines(problems, name)}
+      problems -> {:error, Reader.lines(problems, name)}
     end
   end
 
   defp keys({:keys, _keys}), do: :ok
   defp keys({:list, []}), do: :ok
   defp keys(_other), do: {:error, {1, "a scenario is one list, [key: value, …]"}}
-
-  defp lines(problems, name) do
-    more = length(problems) - @most_lines
-    lines = problems |> Enum.take(@most_lines) |> Enum.map(&line(&1, name))
-    if more > 0, do: lines ++ ["#{name}: and #{more} problems more"], else: lines
-  end
-
-  defp line({line, [], words}, name), do: "#{name}:#{line}: #{words}"
-  defp line({line, path, words}, name), do: "#{name}:#{line}: #{Wording.path(path)}: #{words}"
 
   @doc """
   Writes a scenario into a file.

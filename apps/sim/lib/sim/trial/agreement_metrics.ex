@@ -36,12 +36,12 @@ defmodule Sim.Trial.AgreementMetrics do
         }
 
   @doc """
-  One tick: the claims of the living robots, the parts they are in, and the robots that stand
+  One tick: the claims of the living robots, each with its `role` (`t:Robot.Mission.role/0`), the parts they are in, and the robots that stand
   because the mission says so.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]], [atom()]) :: t()
   def note(agreement, at_ms, claims, parts, standing) do
-    leaders = for {id, %{phase: :lead}} <- claims, do: id
+    leaders = for {id, %{role: :leads}} <- claims, do: id
 
     agreement
     |> rivals(at_ms, parts, leaders)
@@ -117,7 +117,7 @@ defmodule Sim.Trial.AgreementMetrics do
     case Enum.uniq(for {_id, claim} <- claims, do: {claim[:leader], claim[:epoch]}) do
       [{leader, _epoch}] when leader != nil ->
         Enum.all?(claims, fn {id, claim} ->
-          claim[:phase] == if(id == leader, do: :lead, else: :follow)
+          claim.role == if(id == leader, do: :leads, else: :follows)
         end)
 
       _several ->

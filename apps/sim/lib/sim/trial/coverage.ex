@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Coverage do
   @moduledoc """
-  How much of a building is on the map that robots make of it, by the true floor plan. Pure.
+  Measures how much of a building is on the map that robots make of it, by the true floor plan. Pure.
 
   The area is where the middle of a Magellan can come to from the robots' starts, in the cells of their maps. A cell is seen
   when a map knows it, by the poses that the robots estimate; the robot whose map has most counts.

@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Event do
   @moduledoc """
-  The events of a run's script, as data. Pure. An entry of a script is `{at_s, event}`.
+  Describes the events of a run's script, as data. Pure. An entry of a script is `{at_s, event}`.
 
   | event | what happens |
   |---|---|
@@ -43,8 +43,8 @@ defmodule Sim.Trial.Event do
       iex> Sim.Trial.Event.read({20, {:freeze, :mag1, 3}})
       {:ok, {20.0, {:freeze, :mag1, 3.0}}}
       iex> Sim.Trial.Event.read({20, {:tell, :mag1, "goot:1:2"}})
-      {:error, [{["command"], "cannot be \\"goot:1:2\\": :start, :stop, {:formation, kind, spacing} or a text " <>
-        "with one of move, goto, followtheleader, findblob, follow, lead, wander, rest, square, start is allowed; did you mean goto?"}]}
+      {:error, [{["command"], "expected :start, :stop, {:formation, kind, spacing} or a text " <>
+        "with one of move, goto, followtheleader, findblob, follow, lead, wander, rest, square, start, got \\"goot:1:2\\"; did you mean goto?"}]}
   """
   @spec read(term()) :: Type.result() | false
   def read({at_s, event}) do
@@ -60,9 +60,8 @@ defmodule Sim.Trial.Event do
 
   defp under(_key, result), do: result
 
-  @doc "All events, as forms of `Sim.Trial.Form`."
-  @spec forms() :: [Form.form()]
-  def forms do
+  # All events, as forms of `Sim.Trial.Form`.
+  defp forms do
     metres = {:number, -1.0e4, 1.0e4, "m"}
     place = {:tuple, [metres, metres], "{x, y} in metres"}
     degrees = {:number, -36_000, 36_000, "degrees"}
@@ -128,8 +127,8 @@ defmodule Sim.Trial.Event do
 
   defp refuse(value, hint) do
     {:error,
-     "cannot be #{Wording.show(value)}: :start, :stop, {:formation, kind, spacing} or a text " <>
-       "with one of #{Enum.join(@alone, ", ")} is allowed#{hint}"}
+     "expected :start, :stop, {:formation, kind, spacing} or a text " <>
+       "with one of #{Enum.join(@alone, ", ")}, got #{Wording.show(value)}#{hint}"}
   end
 
   @doc """
@@ -137,7 +136,7 @@ defmodule Sim.Trial.Event do
   entry.
 
       iex> Sim.Trial.Event.problems([{2.0, {:kill, :mga1}}], [:mag1, :mag2])
-      [{["script", "1"], "cannot be {:kill, :mga1}: a robot of this run, or :leader, is allowed; did you mean :mag1?"}]
+      [{["script", "1"], "expected a robot of this run, or :leader, got {:kill, :mga1}; did you mean :mag1?"}]
   """
   @spec problems([entry()], [atom()]) :: [Type.problem()]
   def problems(script, robots) do
@@ -159,7 +158,7 @@ defmodule Sim.Trial.Event do
         unknown(event, who, [:leader, :all | robots])
 
       {:error, line} ->
-        {line |> String.split(": ") |> List.last() |> String.replace_suffix(" is allowed", ""),
+        {line |> String.split("expected ") |> List.last() |> String.replace(~r/, got .*$/s, ""),
          ""}
     end
   end

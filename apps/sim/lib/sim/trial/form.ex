@@ -22,9 +22,9 @@ defmodule Sim.Trial.Form do
       iex> Sim.Trial.Form.read({:still, by_s: 1}, forms, "an event")
       {:ok, {:still, [by_s: 1.0]}}
       iex> Sim.Trial.Form.read({:wiat, 2}, forms, "an event")
-      {:error, [{[], "cannot be {:wiat, 2}: an event is one of wait, reset, still; did you mean wait?"}]}
+      {:error, [{[], "expected an event, one of wait, reset, still, got {:wiat, 2}; did you mean wait?"}]}
       iex> Sim.Trial.Form.read({:wait, 2, 3}, forms, "an event")
-      {:error, [{[], "cannot be {:wait, 2, 3}: {:wait, for_s} is allowed"}]}
+      {:error, [{[], "expected {:wait, for_s}, got {:wait, 2, 3}"}]}
   """
   @spec read(term(), [form()], what :: String.t()) :: Type.result()
   def read(term, forms, what) do
@@ -43,7 +43,7 @@ defmodule Sim.Trial.Form do
     {:error,
      [
        {[],
-        "cannot be #{Wording.show(term)}: #{what} is one of #{Enum.join(names, ", ")}" <>
+        "expected #{what}, one of #{Enum.join(names, ", ")}, got #{Wording.show(term)}" <>
           Suggest.hint(String.trim_leading(word, ":"), names)}
      ]}
   end

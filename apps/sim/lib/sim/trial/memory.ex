@@ -1,6 +1,6 @@
 defmodule Sim.Trial.Memory do
   @moduledoc """
-  The memory of a process that plays runs in lockstep. It makes runs faster, and changes none.
+  Prepares the memory of a process that plays runs in lockstep. It makes runs faster, and changes none.
 
   A step makes a million words of garbage for a fleet of twenty. In a heap that has just room for the run, each tenth of a
   step copies all that is alive, and gives memory back to the system that the next one takes again. And a search for blobs

@@ -1,5 +1,5 @@
 defmodule Sim.Trial.Options do
-  @moduledoc "The checked options of a run, with their defaults. Pure."
+  @moduledoc "Checks the options of a run, with their defaults. Pure."
   alias Hal.Options
   alias Hal.Options.Type
   alias Missions.Landmark
@@ -53,8 +53,8 @@ defmodule Sim.Trial.Options do
       iex> line =~ ~r/^trial option nois is not known: allowed are robots, seed, .*; did you mean noise\\?$/
       true
       iex> Sim.Trial.Options.check(robots: 12)
-      {:error, "trial option robots cannot be 12: a list of different names that begin with mag or min, " <>
-        "[:mag1, :min1], is allowed"}
+      {:error, "trial option robots: expected a list of different names that begin with mag or min, " <>
+        "[:mag1, :min1], got 12"}
   """
   @spec check(keyword() | map()) :: {:ok, map()} | {:error, line :: String.t()}
   def check(asked) when is_map(asked), do: asked |> Map.to_list() |> check()

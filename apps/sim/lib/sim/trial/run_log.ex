@@ -6,7 +6,8 @@ defmodule Sim.Trial.RunLog do
 
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 
-  defstruct stages: [],
+  defstruct roles: %{},
+            stages: [],
             leader: nil,
             epoch: 0,
             leaders_at_once_max: 0,
@@ -29,11 +30,12 @@ defmodule Sim.Trial.RunLog do
         }
 
   @typedoc """
-  `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
+  `roles` are those of the mission's phases and stages (`c:Robot.Mission.roles/0`); `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
   radio; `formed_ms` and `rest_ms` say since when the fleet has been in formation, or at rest
   without a landmark; `ticks` and `formed_ticks` count from the first election.
   """
   @type t :: %__MODULE__{
+          roles: %{atom() => Robot.Mission.role()},
           stages: [stage()],
           leader: atom() | nil,
           epoch: non_neg_integer(),
@@ -49,23 +51,27 @@ defmodule Sim.Trial.RunLog do
           stuck: Sim.Trial.Stuck.t()
         }
 
-  @doc "An empty run log."
-  @spec new() :: t()
-  def new, do: %__MODULE__{}
+  @doc "An empty run log of a mission."
+  @spec new(module()) :: t()
+  def new(mission), do: %__MODULE__{roles: Robot.Mission.roles(mission)}
 
   @doc "Records a stage; a search that others have already begun is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
-  def stage(%{searching?: true} = run_log, _at_ms, :search, _robot, _facts), do: run_log
-
   def stage(run_log, at_ms, name, robot, facts) do
     entry = Map.merge(%{stage: name, at_s: at_ms / 1000, robot: robot}, facts)
-    entry = if name == :search, do: %{entry | robot: nil}, else: entry
-    run_log = %{run_log | stages: [entry | run_log.stages]}
 
-    case name do
-      :search -> %{run_log | searching?: true}
-      :elected -> %{run_log | elections: run_log.elections + 1}
-      _other -> run_log
+    case run_log.roles[name] do
+      :searches when run_log.searching? ->
+        run_log
+
+      :searches ->
+        %{run_log | stages: [%{entry | robot: nil} | run_log.stages], searching?: true}
+
+      :elects ->
+        %{run_log | stages: [entry | run_log.stages], elections: run_log.elections + 1}
+
+      _other ->
+        %{run_log | stages: [entry | run_log.stages]}
     end
   end
 
@@ -76,8 +82,8 @@ defmodule Sim.Trial.RunLog do
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]] | nil, [atom()]) :: t()
   def note(run_log, at_ms, claims, parts \\ nil, standing \\ []) do
     parts = parts || [for({id, _claim} <- claims, do: id)]
-    leaders = for {id, %{phase: :lead} = claim} <- claims, do: {id, claim}
-    phases = for {_id, claim} <- claims, do: claim[:phase]
+    claims = for {id, claim} <- claims, do: {id, Map.put(claim, :role, role(run_log, claim))}
+    leaders = for {id, %{role: :leads} = claim} <- claims, do: {id, claim}
     # A mission without a leader has what it wants when every robot says so.
     formed? =
       Enum.any?(leaders, fn {_id, claim} -> claim[:formed] == true end) or
@@ -92,12 +98,14 @@ defmodule Sim.Trial.RunLog do
           Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
         leaders_at_once_max: max(run_log.leaders_at_once_max, at_once(leaders, parts)),
         agreement: AgreementMetrics.note(run_log.agreement, at_ms, claims, parts, standing),
-        searching?: :search in phases,
+        searching?: Enum.any?(claims, &match?({_id, %{role: :searches}}, &1)),
         ticks: run_log.ticks + if(elected?, do: 1, else: 0),
         formed_ticks: run_log.formed_ticks + if(elected? and formed?, do: 1, else: 0),
         formed_ms: if(formed?, do: run_log.formed_ms || at_ms),
         rest_ms:
-          if(phases != [] and Enum.all?(phases, &(&1 == :rest)), do: run_log.rest_ms || at_ms)
+          if(claims != [] and Enum.all?(claims, &match?({_id, %{role: :rests}}, &1)),
+            do: run_log.rest_ms || at_ms
+          )
     }
   end
 
@@ -107,9 +115,11 @@ defmodule Sim.Trial.RunLog do
   """
   @spec judge(t(), integer(), [{atom(), map()}], (atom() -> float() | nil)) :: t()
   def judge(run_log, at_ms, claims, worst) do
-    leaders = for {id, %{phase: :lead, formed: true}} <- claims, do: id
+    leaders = for {id, %{formed: true} = c} <- claims, role(run_log, c) == :leads, do: id
     %{run_log | claims: Claims.note(run_log.claims, at_ms, leaders, worst)}
   end
+
+  defp role(run_log, claim), do: run_log.roles[claim[:phase]]
 
   @doc "The same tick for the invariant of `Sim.Trial.Stuck`; `rows` is called once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()

@@ -1,7 +1,7 @@
 defmodule Sim.Trial.Setup do
   @moduledoc """
-  The start of a fleet: checked options, the world with every robot at its start pose, and each
-  robot's configuration. Pure; the trial and the live fleet both use it.
+  Prepares the start of a fleet: checked options, the world with every robot at its start pose, and each robot's
+  configuration. Pure; the trial and the live fleet both use it.
   """
   alias Hal.{Pose, Profile}
   alias Sim.Trial.Options

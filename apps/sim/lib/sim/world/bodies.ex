@@ -1,5 +1,5 @@
 defmodule Sim.World.Bodies do
-  @moduledoc "The solid objects of a world as discs. Pure."
+  @moduledoc "Lists the solid objects of a world as discs. Pure."
   alias Sim.World.{Body, Contact}
 
   @landmark_radius 0.15

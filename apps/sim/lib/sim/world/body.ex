@@ -1,6 +1,6 @@
 defmodule Sim.World.Body do
   @moduledoc """
-  One robot's body in the world: wheels, odometry, pan-tilt unit, bumpers. Pure.
+  Models one robot's body in the world: wheels, odometry, pan-tilt unit, bumpers. Pure.
 
   The wheels follow the wanted speed with the profile's accelerations and a first-order lag of
   0.1 s; poses are integrated with the mean heading of a step. A body that is stopped by a wall

@@ -1,6 +1,6 @@
 defmodule Sim.World.CameraFrustum do
   @moduledoc """
-  The place of a robot's camera and what its picture can contain. Pure.
+  Places a robot's camera, and tells what its picture can contain. Pure.
 
   A pinhole camera above the robot's centre. Tilt moves the horizon as if the film were shifted,
   so that vertical edges stay columns. Pixel centres lie at whole numbers.

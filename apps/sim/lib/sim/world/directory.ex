@@ -1,8 +1,7 @@
 defmodule Sim.World.Directory do
   @moduledoc """
-  The directory of worlds: a `:pg` scope of its own, beside the robots' directory, so that
-  simulated devices find their world by name on any connected node, and a robot need not know its
-  simulation.
+  Keeps the directory of worlds: a `:pg` scope of its own, beside the robots' directory, so that simulated devices find
+  their world by name on any connected node, and a robot need not know its simulation.
   """
 
   @doc "The scope as a child."

@@ -1,5 +1,5 @@
 defmodule Sim.World.Motion do
-  @moduledoc "One step of everything that moves: robots and the landmark. Pure."
+  @moduledoc "Moves everything that moves by one step: robots and the landmark. Pure."
   alias Hal.Pose
   alias Sim.World.{Body, Contact}
   alias Sim.World.Bodies

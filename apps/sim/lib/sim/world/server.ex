@@ -1,7 +1,7 @@
 defmodule Sim.World.Server do
   @moduledoc """
-  A world in real time, in steps of 50 ms. Simulated devices attach to it; it sends them their
-  readings, and carries out their requests. It does not know processes of robots, only devices.
+  Runs a world in real time, in steps of 50 ms. Simulated devices attach to it; it sends them their readings, and
+  carries out their requests. It does not know processes of robots, only devices.
 
   After each step a drive and a pan-tilt unit get their readings; after every second step a camera
   that has asked gets what moves, and paints its picture itself on the static ground that it got

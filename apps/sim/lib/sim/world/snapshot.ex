@@ -1,7 +1,7 @@
 defmodule Sim.World.Snapshot do
   @moduledoc """
-  The changes of a world since its start, small enough to send ten times a second; together with
-  the initial world they restore the whole world. Pure.
+  Packs the changes of a world since its start, small enough to send ten times a second; together with the initial world
+  they restore the whole world. Pure.
 
   A world that is started from a snapshot goes on where it was; only the sonars are fired again by
   its first step.

@@ -564,7 +564,7 @@ defmodule Sim.Emulator.RFlexControllerTest do
           nonsense: 1
         ] do
       assert {:error, line} = Controller.new([{option, value}], 0)
-      assert line =~ ~r/option #{option}[. ]/
+      assert line =~ ~r/option #{option}[.: ]/
       refute line =~ "\n"
     end
   end

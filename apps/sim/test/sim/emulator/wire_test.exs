@@ -66,11 +66,11 @@ defmodule Sim.Emulator.WireTest do
 
   test "invalid options are named" do
     for {options, name} <- [
-          {[drop: -0.1], "option drop "},
-          {[flip: :nan], "option flip "},
-          {[delay_ms: 5], "option delay_ms "},
-          {[delay_ms: {5, 4}], "option delay_ms "},
-          {[seed: 0.5], "option seed "},
+          {[drop: -0.1], "option drop: "},
+          {[flip: :nan], "option flip: "},
+          {[delay_ms: 5], "option delay_ms: "},
+          {[delay_ms: {5, 4}], "option delay_ms: "},
+          {[seed: 0.5], "option seed: "},
           {[dorp: 1], "option dorp "},
           {[drop: 0.5, flip: 0.6], "together"}
         ] do

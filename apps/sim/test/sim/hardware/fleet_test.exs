@@ -56,6 +56,6 @@ defmodule Sim.Hardware.FleetTest do
     assert line =~ "mag1"
     assert line =~ "lockstep"
     assert {:error, line} = Fleet.start_link(robots: [:mag1], hardware: [:mag2])
-    assert line =~ "hardware cannot be [:mag2]"
+    assert line =~ ~r/hardware: expected .*, got \[:mag2\]/
   end
 end

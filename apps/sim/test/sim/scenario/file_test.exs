@@ -25,13 +25,13 @@ defmodule Sim.Scenario.FileTest do
     {"{1, 2}", "a.exs:1: ", "a scenario is one list"},
     {"[robot: 2]", "a.exs:1: robot: ", "did you mean robots?"},
     {"[robots: 0]", "a.exs:1: robots: ", "a number of robots, 1 to 100, or a list"},
-    {"[robots: [:mag1, :mag1]]", "a.exs:1: robots: ", "cannot be [:mag1, :mag1]"},
+    {"[robots: [:mag1, :mag1]]", "a.exs:1: robots: ", ", got [:mag1, :mag1]"},
     {"[robots: [:nobody_knows_him]]", "a.exs:1: robots: ", "[:nobody_knows_him]"},
     {"[noise: :of]", "a.exs:1: noise: ", "did you mean :off?"},
-    {"[\n script: 5]", "a.exs:2: script: ", "cannot be 5"},
+    {"[\n script: 5]", "a.exs:2: script: ", ", got 5"},
     {"[script: [\n {:reset}]]", "a.exs:2: script.1: ", "{at_s, event}"},
     {"[script: [{5, {:kil, :mag1}}]]", "a.exs:1: script.1: ", "did you mean kill?"},
-    {"[script: [{5, {:kill}}]]", "a.exs:1: script.1: ", "{:kill, robot} is allowed"},
+    {"[script: [{5, {:kill}}]]", "a.exs:1: script.1: ", "expected {:kill, robot}, got {:kill}"},
     {"[script: [{5, {:kill, :mag9}}]]", "a.exs:1: script.1: ", "a robot of this run, or :leader"},
     {"[script: [{5, {:kill, 5}}]]", "a.exs:1: script.1.robot: ", "a robot of this run"},
     {"[script: [{-5, {:reset}}]]", "a.exs:1: script.1.at_s: ", "a number from 0"},
@@ -52,7 +52,8 @@ defmodule Sim.Scenario.FileTest do
     {"[expect: [{:formed}]]", "a.exs:1: expect.1.by_s: ", "is missing"},
     {"[expect: [{:formed, by: 5}]]", "a.exs:1: expect.1.by: ", "did you mean by_s?"},
     {"[expect: [{:formed, by_s: 500}]]", "a.exs:1: expect.1: ", "the run ends after 120 s"},
-    {"[expect: [{:formed, by_s: 5, after_s: 9}]]", "a.exs:1: expect.1: ", "after its beginning"},
+    {"[expect: [{:formed, by_s: 5, after_s: 9}]]", "a.exs:1: expect.1: ",
+     "an end after the beginning"},
     {"[expect: [{:still, :mag9, from_s: 1, to_s: 2}]]", "a.exs:1: expect.1: ",
      ":mag9 is no robot of this run; did you mean :mag"},
     {"[expect: [{:at, :all, {1, 1}, within_m: 1, by_s: 2}]]", "a.exs:1: expect.1.robot: ",
@@ -150,7 +151,7 @@ defmodule Sim.Scenario.FileTest do
 
         # One of the robots may be too few.
         {:error, line} ->
-          assert line =~ "cannot be"
+          assert line =~ ": expected "
       end
     end
   end

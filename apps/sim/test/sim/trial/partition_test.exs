@@ -86,7 +86,7 @@ defmodule Sim.Trial.PartitionTest do
           [{1, 2, [:mag1 | :mag2]}]
         ] do
       assert {:error, line} = Trial.new(%{cuts: cuts})
-      assert line =~ "cuts cannot be" and not (line =~ "\n")
+      assert line =~ "cuts: expected" and not (line =~ "\n")
     end
   end
 
@@ -100,7 +100,7 @@ defmodule Sim.Trial.PartitionTest do
 
   test "two that lead in one part are counted for as long as they do, and only there" do
     lead = fn ids ->
-      for id <- [:a, :b], do: {id, %{phase: if(id in ids, do: :lead, else: :follow)}}
+      for id <- [:a, :b], do: {id, %{role: if(id in ids, do: :leads, else: :follows)}}
     end
 
     agreement =

@@ -19,31 +19,20 @@ defmodule Mix.Tasks.Robot.Check do
   alias Swarm.MemberSpec
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("robot.check", fn -> command(words) end)
-
-  defp command(words) do
-    case OptionParser.parse(words, strict: [help: :boolean]) do
-      {_options, _files, [{word, _value} | _]} ->
-        refuse(["#{word} is not an option; --help lists them"])
-
-      {[help: true], _files, []} ->
-        Mix.shell().info(@moduledoc)
-
-      {_options, [], []} ->
-        files(Path.wildcard("config/robots/*.exs"))
-
-      {_options, files, []} ->
-        files(files)
-    end
+  def run(words) do
+    Hal.CommandOutput.run("robot.check", words, @moduledoc, [strict: [help: :boolean]], fn
+      _options, [] -> files(Path.wildcard("config/robots/*.exs"))
+      _options, files -> files(files)
+    end)
   end
 
-  defp files([]), do: refuse(["no robot file is in config/robots; name one"])
+  defp files([]), do: {:error, "no robot file is in config/robots; name one"}
 
   defp files(files) do
     # Their drivers and missions may be the project's own.
     Hal.CommandBuild.update()
     problems = Enum.flat_map(files, &check/1)
-    if problems != [], do: refuse(problems)
+    if problems != [], do: {:error, problems}
   end
 
   defp check(file) do
@@ -57,10 +46,5 @@ defmodule Mix.Tasks.Robot.Check do
       {:error, line} when is_binary(line) -> ["#{file}: #{line}"]
       {:error, lines} -> lines
     end
-  end
-
-  defp refuse(lines) do
-    Enum.each(lines, fn line -> Mix.shell().error(line) end)
-    exit({:shutdown, 1})
   end
 end

@@ -1,7 +1,7 @@
 defmodule Swarm.Agreement.Round do
   @moduledoc """
-  Agreement on shared inputs: at the end every member of a view holds the same record, and knows
-  that the others do. Pure; time is passed in, in milliseconds.
+  Agrees on shared inputs: at the end every member of a view holds the same record, and knows that the others do. Pure;
+  time is passed in, in milliseconds.
 
       collect --all reports-------------------------> digest --all digests equal--> committed
               --the deadline--> echo --200 ms---------^

@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard.Incarnation do
   @moduledoc """
-  The lives of this node's own robots, each with a number, its incarnation: which one a robot
-  writes its rows in, and what becomes of rows with its name that come from outside. Pure.
+  Numbers the lives of this node's own robots, each an incarnation: which one a robot writes its rows in, and what
+  becomes of rows with its name that come from outside. Pure.
 
   | row from outside | what happens |
   |---|---|

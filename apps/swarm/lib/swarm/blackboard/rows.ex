@@ -1,7 +1,7 @@
 defmodule Swarm.Blackboard.Rows do
   @moduledoc """
-  The rows that a node holds, `owner -> key -> {stamp, value, since when}`: of two rows the higher
-  stamp wins, in whatever order they arrive. Pure.
+  Holds the rows of a node, `owner -> key -> {stamp, value, since when}`: of two rows the higher stamp wins, in whatever
+  order they arrive. Pure.
 
   An owner is a robot, whose rows have one writer and stamps `{incarnation, sequence}`, or a
   bucket of hints, which any robot writes. A hint's stamp is `{count, {writer, check}}`: a count

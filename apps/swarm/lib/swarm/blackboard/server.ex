@@ -59,7 +59,7 @@ defmodule Swarm.Blackboard.Server do
       when is_binary(writer) and byte_size(writer) in 1..255 and is_binary(payload) do
     id = Blackboard.Codec.id(key)
 
-    case Blackboard.State.put_hint(s.rows, writer, id, payload, now()) do
+    case Blackboard.State.put_hint(s.rows, writer, id, payload, Hal.Clock.now_ms()) do
       {:ok, rows} -> {:reply, :ok, written(%{s | rows: rows}, Rows.bucket(id), id)}
       {:error, reason} -> {:reply, {:error, line(reason, writer, key, payload, s)}, s}
     end
@@ -96,7 +96,7 @@ defmodule Swarm.Blackboard.Server do
   def handle_info(:push, s), do: {:noreply, push(s)}
 
   def handle_info(:repair, s) do
-    {rows, gone} = Blackboard.State.forget(s.rows, now())
+    {rows, gone} = Blackboard.State.forget(s.rows, Hal.Clock.now_ms())
 
     {:noreply,
      %{s | rows: rows}
@@ -121,7 +121,7 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp enter(s, owner, robot, boot) do
-    {rows, notes} = Blackboard.State.enter(s.rows, robot, boot, now())
+    {rows, notes} = Blackboard.State.enter(s.rows, robot, boot, Hal.Clock.now_ms())
     noted(%{s | rows: rows, owners: watch(s.owners, robot, owner)}, notes, nil)
   end
 
@@ -148,7 +148,7 @@ defmodule Swarm.Blackboard.Server do
   defp put_one(s, robot, key, payload) do
     id = Blackboard.Codec.id(key)
 
-    with {:ok, rows} <- Blackboard.State.put(s.rows, robot, id, payload, now()),
+    with {:ok, rows} <- Blackboard.State.put(s.rows, robot, id, payload, Hal.Clock.now_ms()),
          do: {:ok, written(%{s | rows: rows}, robot, id)}
   end
 
@@ -182,12 +182,12 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp rows(s, ids) do
-    now_ms = now()
+    now_ms = Hal.Clock.now_ms()
     for {owner, id} <- ids, row <- Rows.rows(s.rows, owner, id, now_ms), do: row
   end
 
   defp heard(s, node, {:rows, rows}) do
-    {rows, notes} = Blackboard.State.merge(s.rows, rows, now())
+    {rows, notes} = Blackboard.State.merge(s.rows, rows, Hal.Clock.now_ms())
     noted(%{s | rows: rows}, notes, node)
   end
 
@@ -197,7 +197,7 @@ defmodule Swarm.Blackboard.Server do
   end
 
   defp heard(s, node, {:have, stamps}) do
-    {lacked, wanted} = AntiEntropy.diff(s.rows, stamps, now())
+    {lacked, wanted} = AntiEntropy.diff(s.rows, stamps, Hal.Clock.now_ms())
     answer(s, node, Blackboard.Codec.tell(lacked) ++ Blackboard.Codec.want(wanted))
   end
 
@@ -264,7 +264,6 @@ defmodule Swarm.Blackboard.Server do
   defp held(s, _bucket), do: {Rows.shown_as(), s.rows.hints}
 
   defp drop(s, count), do: %{s | dropped: s.dropped + count}
-  defp now, do: System.monotonic_time(:millisecond)
 
   defp seed(nil), do: :rand.seed_s(:exsss)
   defp seed(seed), do: :rand.seed_s(:exsss, seed)

@@ -9,7 +9,7 @@ defmodule Swarm.Directory.Scope do
     * what the scopes of other nodes tell: each speaks for processes of its own node only;
     * the end of a process, unless that process is alive or is still monitored.
   """
-  use GenServer
+  use Hal.HardenedServer
   import Swarm.Wire, only: [list?: 2]
   alias Hal.HardenedServer
 
@@ -33,8 +33,6 @@ defmodule Swarm.Directory.Scope do
       do: :pg.handle_cast(told, s),
       else: HardenedServer.drop(s)
   end
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(message, s) do

@@ -8,7 +8,7 @@ defmodule Swarm.Discovery.Presence do
   exist. A robot whose connection ended, but that is still heard, joins again as soon as that is
   certain.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{HardenedServer, Ticker}
   alias Mesh.Nonblocking
   alias Swarm.Directory
@@ -69,12 +69,6 @@ defmodule Swarm.Discovery.Presence do
 
   def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
 
-  # It has a name that connected nodes can send to, so anything may arrive here.
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({ref, :join, {:robot, robot}, pids}, %{ref: ref} = s) do
     pids = Enum.uniq(pids ++ Map.get(s.pids, robot, []))
@@ -89,7 +83,11 @@ defmodule Swarm.Discovery.Presence do
   def handle_info({ref, :leave, {:robot, robot}, gone}, %{ref: ref} = s) do
     case Map.get(s.pids, robot, []) -- gone do
       [] ->
-        doubt = if is_map_key(s.heard, robot), do: Map.put(s.doubt, robot, now()), else: s.doubt
+        doubt =
+          if is_map_key(s.heard, robot),
+            do: Map.put(s.doubt, robot, Hal.Clock.now_ms()),
+            else: s.doubt
+
         s = %{s | pids: Map.delete(s.pids, robot), doubt: doubt}
         {:noreply, judge(s, robot, reason(gone))}
 
@@ -110,7 +108,6 @@ defmodule Swarm.Discovery.Presence do
   end
 
   def handle_info({:DOWN, _ref, :process, pid, _reason}, s), do: {:noreply, forget(s, pid)}
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp enter(s) do
     scope = Directory.monitor()
@@ -130,7 +127,7 @@ defmodule Swarm.Discovery.Presence do
   defp look(s) do
     s = %{s | ticker: Ticker.next(s.ticker)}
     heard = Mesh.robots()
-    certain = now() - @certain_ms
+    certain = Hal.Clock.now_ms() - @certain_ms
     doubt = Map.filter(s.doubt, fn {_robot, since_ms} -> since_ms > certain end)
     # For robots that were heard before, the mesh knows whether they are present.
     known =
@@ -209,6 +206,4 @@ defmodule Swarm.Discovery.Presence do
     if ref, do: Process.demonitor(ref, [:flush])
     %{s | subscribers: subscribers}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

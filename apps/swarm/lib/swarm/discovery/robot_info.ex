@@ -156,7 +156,7 @@ defmodule Swarm.Discovery.RobotInfo do
 
       {key, value} ->
         {:error,
-         "#{inspect(key)} cannot be #{inspect(value)}: write calibrated: true or false, services: [:name]"}
+         "#{inspect(key)}: expected calibrated: true or false, or services: [:name], got #{inspect(value)}"}
     end
   end
 

@@ -62,7 +62,7 @@ defmodule Swarm.Discovery.Search do
   end
 
   defp wrong({key, wanted}) do
-    unless allowed?(key, wanted), do: "#{key} cannot be #{inspect(wanted)}: #{allowed(key)}"
+    unless allowed?(key, wanted), do: "#{key}: expected #{allowed(key)}, got #{inspect(wanted)}"
   end
 
   defp allowed?(:max_age_ms, ms), do: ms == :infinity or (is_integer(ms) and ms >= 0)

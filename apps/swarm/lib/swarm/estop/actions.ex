@@ -1,7 +1,7 @@
 defmodule Swarm.EStop.Actions do
   @moduledoc """
-  The actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of
-  the stop, and spreads it.
+  Carries out the actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of the stop,
+  and spreads it.
   """
   alias Hal.Device
   alias Robot.{Board, Names}
@@ -209,13 +209,12 @@ defmodule Swarm.EStop.Actions do
 
   defp now_us, do: System.monotonic_time(:microsecond)
 
-  @doc "Sets the state of the stop: if it differs, it is recorded, carried out and spread."
-  @spec become(t(), EStop.State.t()) :: t()
-  def become(%{stop: stop} = s, stop), do: s
+  # Sets the state of the stop: if it differs, it is recorded, carried out and spread.
+  defp become(%{stop: stop} = s, stop), do: s
 
   # Recorded before the gate is told: an e-stop process that restarts in between knows that there
   # is a stop to carry out and to spread.
-  def become(%{stop: before} = s, stop) do
+  defp become(%{stop: before} = s, stop) do
     s = hold(write(%{s | stop: stop}))
 
     # The mission ends with it: after the reset nothing moves until somebody gives a command.

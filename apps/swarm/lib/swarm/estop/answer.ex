@@ -1,6 +1,6 @@
 defmodule Swarm.EStop.Answer do
   @moduledoc """
-  The answer of a gate that has carried out a stop, to the e-stop process or to the caller.
+  Answers for a gate that has carried out a stop, to the e-stop process or to the caller.
   """
   alias Hal.Device
   alias Robot.{Board, Names}

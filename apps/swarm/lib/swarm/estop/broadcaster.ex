@@ -11,7 +11,7 @@ defmodule Swarm.EStop.Broadcaster do
   the sender. A reset ends the repeats, so that they do not stop a robot that is switched on
   afterwards.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Mesh.Nonblocking
   alias Swarm.Directory
@@ -56,7 +56,7 @@ defmodule Swarm.EStop.Broadcaster do
   # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
   def handle_cast({:repeat, call, times}, s) when times in 1..@times,
-    do: {:noreply, if(Calls.call?(call), do: repeat(s, call, times, now()), else: s)}
+    do: {:noreply, if(Calls.call?(call), do: repeat(s, call, times, Hal.Clock.now_ms()), else: s)}
 
   def handle_cast({:pass_on, call, age_ms}, s) do
     whole? = Calls.call?(call) and Calls.age?(age_ms)
@@ -71,24 +71,17 @@ defmodule Swarm.EStop.Broadcaster do
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
 
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({:again, call}, s) do
     case s.left do
       %{^call => {left, since_ms}} ->
-        send_out(call, now() - since_ms)
+        send_out(call, Hal.Clock.now_ms() - since_ms)
         {:noreply, repeat(%{s | left: Map.delete(s.left, call)}, call, left - 1, since_ms)}
 
       _none ->
         {:noreply, s}
     end
   end
-
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp pass_on(%{left: left} = s, _call, _age_ms) when map_size(left) >= @most, do: s
 
@@ -100,7 +93,7 @@ defmodule Swarm.EStop.Broadcaster do
 
       {true, heard} ->
         send_out(call, age_ms)
-        repeat(%{s | heard: heard}, call, @passed_on - 1, now() - age_ms)
+        repeat(%{s | heard: heard}, call, @passed_on - 1, Hal.Clock.now_ms() - age_ms)
     end
   end
 
@@ -116,8 +109,6 @@ defmodule Swarm.EStop.Broadcaster do
     for pid <- Directory.members(:estops), do: Nonblocking.cast(pid, {:estop, call, age_ms})
     Mesh.broadcast(:stop, {:estop, call, age_ms})
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 
   # The time of day at which this VM was started.
   defp boot do

@@ -2,8 +2,7 @@ defmodule Swarm.EStop.Server do
   @moduledoc """
   Runs the process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
   """
-  use GenServer
-  alias Hal.HardenedServer
+  use Hal.HardenedServer
   alias Robot.{Board, Names}
   alias Robot.Safety.Gate
   alias Swarm.EStop
@@ -54,11 +53,6 @@ defmodule Swarm.EStop.Server do
          name: Directory.Membership.enter([{:estop, s.id}])
      }}
   end
-
-  @impl GenServer
-  # E-stop processes are found in the directory, so anything may arrive from anywhere; the rest is
-  # ignored.
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_cast({:beat, tags}, s),
@@ -112,8 +106,6 @@ defmodule Swarm.EStop.Server do
     do: {:noreply, %{s | name: Directory.Membership.leave(s.name)}}
 
   def handle_cast({:present, true}, s), do: {:noreply, s}
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info({:unsaved, ref}, s) when is_reference(ref) do

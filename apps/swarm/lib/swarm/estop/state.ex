@@ -1,6 +1,6 @@
 defmodule Swarm.EStop.State do
   @moduledoc """
-  The spreading and clearing of an emergency stop, as a function. Pure.
+  Models the spreading and clearing of an emergency stop, as a function. Pure.
 
   Each stop has a tag, made from its call (`tag/1`). A robot is held by a set of stops. Every heartbeat carries the tags
   of those that hold its robot, and whoever hears a tag that no person has cleared here is held by that stop, too. A

@@ -1,8 +1,7 @@
 defmodule Swarm.Formation.Kind do
   @moduledoc """
-  The behaviour of a shape that a build adds to those of `Swarm.Formation`; the configuration
-  gives it a name. Pure: each robot computes the slots by itself, and all must get the same
-  result.
+  Defines a shape that a build adds to those of `Swarm.Formation`; the configuration gives it a name. Pure: each robot
+  computes the slots by itself, and all must get the same result.
 
       defmodule Mine.Echelon do
         @behaviour Swarm.Formation.Kind

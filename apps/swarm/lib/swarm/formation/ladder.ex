@@ -1,6 +1,6 @@
 defmodule Swarm.Formation.Ladder do
   @moduledoc """
-  The shape that fits where the leader stands, by one ladder, the best first. Pure.
+  Chooses the shape that fits where the leader stands, by one ladder, the best first. Pure.
 
   | rung | the shape |
   |---|---|

@@ -1,6 +1,6 @@
 defmodule Swarm.Formation.Trail do
   @moduledoc """
-  The path that a robot has driven, and places along it. Pure; metres, newest point first.
+  Remembers the path that a robot has driven, and places along it. Pure; metres, newest point first.
 
   A column along the leader's trail goes where the leader went: through the doorway that it used,
   not through the wall beside it.

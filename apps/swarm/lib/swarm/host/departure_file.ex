@@ -1,6 +1,6 @@
 defmodule Swarm.Host.DepartureFile do
   @moduledoc """
-  The file by which the robot of this machine knows that it has left its start pose (`Robot.Departure`).
+  Keeps the file by which the robot of this machine knows that it has left its start pose (`Robot.Departure`).
 
   It is in the release's folder of what does not outlive a boot. A person who starts the robot puts it at its start pose
   before, so the file goes; systemd may start it after a crash, so it stays, and goes with its folder when a person stops

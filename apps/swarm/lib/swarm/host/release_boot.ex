@@ -229,9 +229,7 @@ defmodule Swarm.Host.ReleaseBoot do
 
   defp interface(%{interface: text}) do
     with :error <- Interface.read(text),
-         do:
-           {:error,
-            "CONVOY_INTERFACE cannot be #{inspect(text)}: #{Interface.allowed()} is allowed"}
+         do: {:error, "CONVOY_INTERFACE: expected #{Interface.allowed()}, got #{inspect(text)}"}
   end
 
   defp file({file, _config}), do: file

@@ -14,7 +14,7 @@ defmodule Swarm.Host.Systemd do
   robot's id, `nil` for a node without one; `:period_ms`, how often it checks; `:pulse`, a
   function in place of `Swarm.Host.HealthCheck.of/1`.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{HardenedServer, Ticker}
   alias Swarm.Host.HealthCheck
 
@@ -66,14 +66,7 @@ defmodule Swarm.Host.Systemd do
   def handle_continue(:look, s), do: {:noreply, look(s)}
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
   def handle_info(:look, s), do: {:noreply, look(s)}
-  def handle_info(_other, s), do: HardenedServer.drop(s)
 
   defp look(s) do
     s = %{s | ticker: Ticker.next(s.ticker)}

@@ -1,8 +1,8 @@
 defmodule Swarm.Membership.NameSet do
   @moduledoc """
-  A set of names in one binary, for heartbeats that list the robots that a robot hears. A hundred
-  robots exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at
-  every send, every write to a board and every read of one, while a binary is shared. Pure.
+  Packs a set of names into one binary, for heartbeats that list the robots that a robot hears. A hundred robots
+  exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at every send, every write to a
+  board and every read of one, while a binary is shared. Pure.
   """
 
   @typedoc "The names, sorted, each with a zero before and behind it."

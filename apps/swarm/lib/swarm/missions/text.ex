@@ -62,7 +62,7 @@ defmodule Swarm.Missions.Text do
   defp fault({sign, next}),
     do: "options are separated by a comma, not by #{inspect(sign)}: …,#{next}=…"
 
-  defp fault(wrong), do: "#{inspect(wrong)} is no option: KEY=VALUE,… is allowed"
+  defp fault(wrong), do: "expected KEY=VALUE,…, got #{inspect(wrong)}"
 
   # A value that its type refuses, and in which another option begins.
   defp joined({key, value}, table) when is_atom(key) and is_binary(value) do

@@ -53,7 +53,7 @@ defmodule Swarm.Replacement.Code do
   defp unreadable(other),
     do:
       {:error,
-       "code cannot be #{Wording.show(other)}: a mission's module, or [{module, object code}, …], is allowed"}
+       "code: expected a mission's module, or [{module, object code}, …], got #{Wording.show(other)}"}
 
   # What is not executed would only take longer on its way. `Attr` says what is a mission.
   defp stripped(read, named) do

@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Job do
   @moduledoc """
-  One replacement on one node, as a function: its robots stand, change, and go on; or go back. Pure; times are
+  Models one replacement on one node, as a function: its robots stand, change, and go on; or go back. Pure; times are
   monotonic, in ms.
 
   | phase | ends when | then |

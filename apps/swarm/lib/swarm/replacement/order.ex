@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Order do
   @moduledoc """
-  The order that replaces a mission, as bytes, and its signature. Pure.
+  Encodes the order that replaces a mission, as bytes, with its signature. Pure.
 
   Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
   options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
@@ -53,7 +53,7 @@ defmodule Swarm.Replacement.Order do
       do: {:ok, content},
       else:
         {:error,
-         "#{name(order.mission)}: its code takes #{div(byte_size(content), 1024)} kB; #{div(@most_bytes, 1024)} kB are allowed"}
+         "#{name(order.mission)}: expected code of at most #{div(@most_bytes, 1024)} kB, got #{div(byte_size(content), 1024)} kB"}
   end
 
   @doc "The order of bytes whose signature was checked; `:error` for anything else."

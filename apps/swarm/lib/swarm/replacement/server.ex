@@ -4,7 +4,7 @@ defmodule Swarm.Replacement.Server do
   the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
   its successor brings back the release.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Swarm.Replacement
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Nonblocking, Secret}
@@ -88,8 +88,6 @@ defmodule Swarm.Replacement.Server do
       when is_binary(bytes) and node(caller) == node(),
       do: {:reply, {:ok, own(bytes, s)}, s}
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast(:keep, %{kept: kept} = s) when kept == %{},
     do: {:noreply, %{s | kept: Replacement.Code.keep()}}
@@ -117,8 +115,6 @@ defmodule Swarm.Replacement.Server do
   def handle_cast({:started, id, robot, result}, s),
     do: {:noreply, step(s, id, {:started, robot, result})}
 
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_info({:tick, tick}, %{tick: tick} = s) when tick != nil do
     s = Enum.reduce(s.fallen, s, &fallen/2)
@@ -136,8 +132,6 @@ defmodule Swarm.Replacement.Server do
     {what, s} = pop_in(s.monitors[monitor])
     {:noreply, ended(what, reason, s)}
   end
-
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   defp turning(%{phase: :standing, robots: robots}),
     do: robots |> Map.keys() |> Enum.filter(&Entries.turns?/1)
@@ -163,7 +157,7 @@ defmodule Swarm.Replacement.Server do
   end
 
   defp recent(seen, id) do
-    now_ms = now()
+    now_ms = Hal.Clock.now_ms()
     seen |> Map.filter(fn {_id, at_ms} -> now_ms - at_ms < @seen_ms end) |> Map.put(id, now_ms)
   end
 
@@ -181,7 +175,7 @@ defmodule Swarm.Replacement.Server do
     s = Enum.reduce(robots, s, &watch/2)
     on = Map.new(robots, &{&1, Entries.running(&1)})
     before = Map.new(robots, &{&1, Entries.noted(&1)})
-    {job, effects} = Job.new(on, {module, []}, now())
+    {job, effects} = Job.new(on, {module, []}, Hal.Clock.now_ms())
 
     entry = %{
       job: job,
@@ -201,7 +195,7 @@ defmodule Swarm.Replacement.Server do
   defp step(s, id, event) do
     case s.jobs do
       %{^id => entry} ->
-        {job, effects} = Job.step(entry.job, event, now())
+        {job, effects} = Job.step(entry.job, event, Hal.Clock.now_ms())
         s = carry_out(effects, id, put_in(s.jobs[id].job, job))
         if job.phase == :done, do: finish(s, id), else: s
 
@@ -263,7 +257,7 @@ defmodule Swarm.Replacement.Server do
     Pilot.deliver(robot, :start, %Delivery{
       ways: [{:start, module, options}],
       asked: entry.at_us,
-      until_ms: now() + @start_ms,
+      until_ms: Hal.Clock.now_ms() + @start_ms,
       reply: {__MODULE__, :started, [id, robot]}
     })
 
@@ -370,6 +364,4 @@ defmodule Swarm.Replacement.Server do
   end
 
   defp schedule(s), do: s
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,6 +1,7 @@
 defmodule Swarm.Status.Frame do
   @moduledoc """
-  In which frame a robot's pose is, as its status says: only poses of one frame tell where robots are to each other. Pure.
+  Tells in which frame a robot's pose is, as its status says: only poses of one frame tell where robots are to each
+  other. Pure.
 
   `within` is `:start`, the frame of the start poses, in which each robot begins, or `{robot, number}`: one that this robot
   defined when it led. `own` is the number of the frame that this robot itself defines now for those who follow it: its

@@ -7,7 +7,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   Each crash is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. If a
   part cannot be started with the node, the start of the node fails, as under any supervisor.
   """
-  use GenServer
+  use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Mesh.Backoff
 
@@ -31,7 +31,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   @impl GenServer
   def init(%{id: id, start: start}) do
     Process.flag(:trap_exit, true)
-    s = %{id: id, start: start, pid: nil, falls: [], backoff: Backoff.new(now())}
+    s = %{id: id, start: start, pid: nil, falls: [], backoff: Backoff.new(Hal.Clock.now_ms())}
 
     case begin(start) do
       {:ok, pid} -> {:ok, %{s | pid: pid}}
@@ -40,15 +40,13 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   end
 
   @impl GenServer
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
-
-  @impl GenServer
   def handle_info({:EXIT, pid, reason}, %{pid: pid} = s) do
-    Event.execute([:swarm, :part, :fell], %{at_ms: now()}, %{id: s.id, reason: reason})
-    falls = [now() | Enum.filter(s.falls, &(now() - &1 < @within_ms))]
+    Event.execute([:swarm, :part, :fell], %{at_ms: Hal.Clock.now_ms()}, %{
+      id: s.id,
+      reason: reason
+    })
+
+    falls = [Hal.Clock.now_ms() | Enum.filter(s.falls, &(Hal.Clock.now_ms() - &1 < @within_ms))]
     {:noreply, again(%{s | pid: nil, falls: falls})}
   end
 
@@ -58,8 +56,6 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
       {:error, _reason} -> {:noreply, later(s)}
     end
   end
-
-  def handle_info(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def terminate(_reason, %{pid: nil}), do: :ok
@@ -96,14 +92,12 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
 
   defp again(s) do
     send(self(), :again)
-    %{s | backoff: Backoff.new(now())}
+    %{s | backoff: Backoff.new(Hal.Clock.now_ms())}
   end
 
   defp later(s) do
-    backoff = Backoff.tried(s.backoff, now(), 0.5)
+    backoff = Backoff.tried(s.backoff, Hal.Clock.now_ms(), 0.5)
     Process.send_after(self(), :again, backoff.due_ms, abs: true)
     %{s | backoff: backoff}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -30,10 +30,6 @@ defmodule Swarm.Wire.CounterGuard do
           since_ms: integer() | nil
         }
 
-  @doc "How far a number may rise in a second."
-  @spec step() :: pos_integer()
-  def step, do: @step
-
   @doc """
   The highest number that is admitted now. `known` is the highest that the caller knows itself,
   0 if it relies on what this guard has admitted.

@@ -30,7 +30,7 @@ defmodule Swarm.Formation.KindTest do
     refute :gone in Formation.kinds()
     refute Formation.valid?({:gone, 1.0})
     assert {:error, line} = Formation.new(:gone)
-    assert line =~ "formation cannot be :gone" and line =~ "ladder"
+    assert line =~ ~r/formation: expected .*, got :gone/ and line =~ "ladder"
     refute Formation.valid?({"ladder", 1.0})
   end
 end

@@ -179,6 +179,6 @@ defmodule Swarm.Replacement.CodeTest do
              {:error, "the code cannot be read: it is no object code"}
 
     for wrong <- [[], [:a], [{:a, 1}], [{Ours.Code5, "junk"} | :a], 7, nil, "text"],
-        do: assert({:error, "code cannot be " <> _} = Replacement.Code.read(wrong))
+        do: assert({:error, "code: expected " <> _} = Replacement.Code.read(wrong))
   end
 end

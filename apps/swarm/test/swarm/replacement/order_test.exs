@@ -71,7 +71,7 @@ defmodule Swarm.Replacement.OrderTest do
     code = [{"Elixir.Ours.Gather", :crypto.strong_rand_bytes(Order.most_bytes())}]
 
     assert Order.encode(new(code: code)) ==
-             {:error, "Ours.Gather: its code takes 128 kB; 128 kB are allowed"}
+             {:error, "Ours.Gather: expected code of at most 128 kB, got 128 kB"}
   end
 
   test "what is signed differs by robot, time and content, and only the whole signature is one" do

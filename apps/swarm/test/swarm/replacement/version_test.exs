@@ -145,7 +145,7 @@ defmodule Swarm.Replacement.VersionTest do
     listen(id, [:robot, :stage])
     given(id, {:code, code, speed: 9})
     [says] = went_back([id])
-    assert says =~ ": version3 option speed cannot be 9: a number from 0.05 to 0.5 m/s is allowed"
+    assert says =~ ": version3 option speed: expected a number from 0.05 to 0.5 m/s, got 9"
     eventually(fn -> mission(id).state == {StandMission, :stand} end)
     refute :erlang.module_loaded(Ours.Version3)
   end

@@ -36,11 +36,12 @@ defmodule Mix.Tasks.Blobs do
       mix blobs /dev/video0 --colours landmark.txt --json - --frames 100
   """
   use Mix.Task
+  alias Hal.CommandOutput
   alias Vision.Blobs.{Options, Report}
   alias Vision.{Blobs, Colours, Picture}
 
   @impl Mix.Task
-  def run(words), do: Hal.CommandOutput.run("blobs", fn -> command(words) end)
+  def run(words), do: CommandOutput.run("blobs", fn -> command(words) end)
 
   defp command(words) do
     # The backend may be the project's own.
@@ -48,7 +49,7 @@ defmodule Mix.Tasks.Blobs do
 
     case Options.parse(words) do
       {:ok, options} -> options |> find() |> finish()
-      {:error, line} -> refuse(line)
+      {:error, line} -> CommandOutput.refuse(line)
       :help -> Mix.shell().info(@moduledoc)
     end
   end
@@ -68,12 +69,7 @@ defmodule Mix.Tasks.Blobs do
   defp finish(:ok), do: :ok
   defp finish(:halted), do: exit({:shutdown, 1})
 
-  defp finish({:error, line}), do: refuse(line)
-
-  defp refuse(line) do
-    Mix.shell().error(line)
-    exit({:shutdown, 1})
-  end
+  defp finish({:error, line}), do: CommandOutput.refuse(line)
 
   defp looked(output, options, colours) do
     terminal? = output != :table and match?({:ok, _columns}, :io.columns(:standard_error))

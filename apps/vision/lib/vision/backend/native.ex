@@ -1,7 +1,7 @@
 defmodule Vision.Backend.Native do
   @moduledoc """
-  The blob finder in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal
-  masks to those of the row above, so that only runs and regions take memory.
+  Finds blobs in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal masks to those of the row
+  above, so that only runs and regions take memory.
 
   With a scratch it searches for up to a millisecond on the scheduler of its caller; a large or
   noisy frame is finished on a dirty scheduler. Without one it is a dirty scheduler's from the
@@ -27,27 +27,13 @@ defmodule Vision.Backend.Native do
   If memory is out, the answer is `{:error, :memory}`, and the scratch can be used again.
   """
   @behaviour Vision.Backend
-  @on_load :load
+  use Hal.Nif, app: :vision, library: "blobs"
   alias Hal.Frame
   alias Vision.Colours
 
   # As in blobs.c: areas then fit into 32 bits.
   @largest 32_768
   @formats %{yuyv: 0, i420: 1, nv12: 2}
-
-  @doc false
-  @spec load() :: :ok
-  def load do
-    # Without the library the stubs remain, and `Vision.blobs/4` uses the reference.
-    _ = :erlang.load_nif(to_charlist(Application.app_dir(:vision, "priv/blobs")), 0)
-    :ok
-  end
-
-  @doc "Whether the C library was built and loaded."
-  @spec loaded?() :: boolean()
-  # The library replaces this function. From a plain `false`, a compiler that infers types would
-  # conclude that it is always false.
-  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
 
   @impl Vision.Backend
   def reads?(format), do: is_map_key(@formats, format) and loaded?()

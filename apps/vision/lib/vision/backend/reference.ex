@@ -1,8 +1,8 @@
 defmodule Vision.Backend.Reference do
   @moduledoc """
-  The definition of a region in plain Elixir: a map of all coloured pixels, and a flood fill over
-  it. It reads every format. It compares pixels with the limits of the classes, not with the
-  tables, so that a comparison also checks the tables of the faster backends.
+  Defines a region in plain Elixir: a map of all coloured pixels, and a flood fill over it. It reads every format. It
+  compares pixels with the limits of the classes, not with the tables, so that a comparison also checks the tables of
+  the faster backends.
   """
   @behaviour Vision.Backend
   import Bitwise

@@ -93,7 +93,7 @@ defmodule Vision.Blobs.Options do
         "#{option} needs a value"
 
       option in known ->
-        "#{option} cannot be #{inspect(value)}: a whole number is allowed"
+        "#{option}: expected a whole number, got #{inspect(value)}"
 
       true ->
         "unknown option #{option}#{suggestion(option, known)}"
@@ -110,7 +110,7 @@ defmodule Vision.Blobs.Options do
     do: {:error, "no source: give a picture, video file, stream, /dev/video0 or testsrc"}
 
   defp one_source(many),
-    do: {:error, "#{length(many)} sources (#{Enum.join(many, ", ")}): one is allowed"}
+    do: {:error, "expected one source, got #{length(many)}: #{Enum.join(many, ", ")}"}
 
   defp safe(_source, true), do: :ok
 
@@ -129,15 +129,14 @@ defmodule Vision.Blobs.Options do
   defp positive(_option, value) when value in 1..@most, do: :ok
 
   defp positive(option, value),
-    do: {:error, "#{option} cannot be #{value}: whole numbers from 1 to #{@most} are allowed"}
+    do: {:error, "#{option}: expected whole numbers from 1 to #{@most}, got #{value}"}
 
   defp picture(nil), do: :ok
 
   defp picture(path) do
     if String.downcase(Path.extname(path)) in [".png", ".jpg", ".jpeg"],
       do: :ok,
-      else:
-        {:error, "--picture cannot be #{inspect(path)}: names ending in .png or .jpg are allowed"}
+      else: {:error, "--picture: expected names ending in .png or .jpg, got #{inspect(path)}"}
   end
 
   defp writable(_option, path) when path in [nil, "-"], do: :ok
@@ -145,10 +144,10 @@ defmodule Vision.Blobs.Options do
   defp writable(option, path) do
     cond do
       path == "" ->
-        {:error, "#{option} cannot be \"\": the name of a file is allowed"}
+        {:error, "#{option}: expected the name of a file, got \"\""}
 
       File.dir?(path) ->
-        {:error, "#{option} cannot be #{inspect(path)}: it is a folder"}
+        {:error, "#{option}: expected a file, got #{inspect(path)}, a folder"}
 
       not File.dir?(Path.dirname(path)) ->
         {:error, "#{option} #{path}: no folder #{Path.dirname(path)}"}
@@ -163,7 +162,7 @@ defmodule Vision.Blobs.Options do
   # The colours check whether it is a backend.
   defp backend(name) do
     with :error <- Hal.Options.ModuleLookup.module(name),
-         do: {:error, "--backend cannot be #{inspect(name)}: a module of this build is allowed"}
+         do: {:error, "--backend: expected a module of this build, got #{inspect(name)}"}
   end
 
   defp distances(texts) do
@@ -175,7 +174,7 @@ defmodule Vision.Blobs.Options do
         _other ->
           {:halt,
            {:error,
-            "--distance cannot be #{inspect(text)}: NAME=K with K above 0 is allowed, as in Yellow=0.0651"}}
+            "--distance: expected NAME=K with K above 0, as in Yellow=0.0651, got #{inspect(text)}"}}
       end
     end)
   end

@@ -1,6 +1,6 @@
 defmodule Vision.Calibration.Sample do
   @moduledoc """
-  Places in a picture, and their pixels. Pure.
+  Takes the pixels of places in a picture. Pure.
 
   A place is `{:point, {x, y}}`, which stands for the 5 by 5 pixels around it, or
   `{:box, {x, y, width, height}}`; pixels count from the top left.
@@ -50,9 +50,8 @@ defmodule Vision.Calibration.Sample do
   defp inside?({:box, {x, y, w, h}}, width, height),
     do: x >= 0 and y >= 0 and w >= 1 and h >= 1 and x + w <= width and y + h <= height
 
-  @doc "A place as a person writes it."
-  @spec words(place()) :: String.t()
-  def words({kind, numbers}), do: "#{kind} #{numbers |> Tuple.to_list() |> Enum.join(",")}"
+  # A place as a person writes it.
+  defp words({kind, numbers}), do: "#{kind} #{numbers |> Tuple.to_list() |> Enum.join(",")}"
 
   @doc """
   The first and last pixels that a place covers; those of a point are limited to a picture of this

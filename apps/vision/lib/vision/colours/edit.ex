@@ -28,8 +28,7 @@ defmodule Vision.Colours.Edit do
     if name =~ ~r/\A[^\s#[:cntrl:]][^\s[:cntrl:]]{0,59}\z/u,
       do: :ok,
       else:
-        {:error,
-         "a colour cannot be named #{inspect(name)}: one word of up to 60 letters is allowed"}
+        {:error, "name of a colour: expected one word of up to 60 letters, got #{inspect(name)}"}
   end
 
   defp fresh(class), do: "[Colors]\n#{colour(class)}\n\n[Thresholds]\n#{limits(class)}\n"

@@ -54,7 +54,7 @@ defmodule Vision.Colours.Text do
   end
 
   defp read_line(line, _number, _scan) when byte_size(line) > @longest,
-    do: {:error, "#{byte_size(line)} bytes long, #{@longest} are allowed"}
+    do: {:error, "expected at most #{@longest} bytes, got #{byte_size(line)}"}
 
   defp read_line(line, number, %{section: nil} = scan) do
     case header(line) do
@@ -76,7 +76,7 @@ defmodule Vision.Colours.Text do
 
   defp enter(scan, section, _number), do: %{scan | section: section, seen: [section | scan.seen]}
 
-  defp again(section), do: {:error, "a second #{title(section)} section: one is allowed"}
+  defp again(section), do: {:error, "expected one #{title(section)} section, got a second"}
 
   defp leave(scan, line, number) do
     ended = Map.put(scan.ended, scan.section, number)
@@ -119,7 +119,7 @@ defmodule Vision.Colours.Text do
 
       {[lowest, highest], channel} ->
         {:error,
-         "threshold #{channel} #{lowest}:#{highest} is out of range: 0 to 255 is allowed, the lower number first"}
+         "threshold #{channel}: expected 0 to 255, the lower number first, got #{lowest}:#{highest}"}
     end
   end
 

@@ -1,8 +1,8 @@
 defmodule Vision.Jpeg.Encoder do
   @moduledoc """
-  A running ffmpeg that encodes frames of one shape as JPEG, one at a time. It runs outside the
-  VM, with one thread and, if `nice` exists, with a lower priority. When the process that opened
-  it or the VM ends, its input ends, and ffmpeg with it, unless it hangs.
+  Runs an ffmpeg that encodes frames of one shape as JPEG, one at a time. It runs outside the VM, with one thread and,
+  if `nice` exists, with a lower priority. When the process that opened it or the VM ends, its input ends, and ffmpeg
+  with it, unless it hangs.
 
   The process that opens it receives its messages, must trap exits, and passes the messages to
   `handle/2`. No function waits for ffmpeg, even if it hangs: a caller that has waited long enough

@@ -1,5 +1,5 @@
 defmodule Vision.Saver.Options do
-  @moduledoc "The options that people give to `Vision.Saver`, where they are listed. Pure."
+  @moduledoc "Lists the options that people give to `Vision.Saver`, where they are explained. Pure."
   alias Hal.Options
 
   @table [
@@ -19,7 +19,7 @@ defmodule Vision.Saver.Options do
       iex> Vision.Saver.Options.check(folder: "/tmp")
       {:ok, [rate: 1.0, files: 1_000, megabytes: 100, folder: "/tmp"]}
       iex> Vision.Saver.Options.check(folder: "/tmp", files: 0)
-      {:error, "saver option files cannot be 0: a whole number from 1 to 100000 is allowed"}
+      {:error, "saver option files: expected a whole number from 1 to 100000, got 0"}
   """
   @spec check(term()) :: {:ok, keyword()} | {:error, line :: String.t()}
   def check(options), do: Options.check(options, @table, "saver")

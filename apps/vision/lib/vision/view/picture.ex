@@ -1,5 +1,5 @@
 defmodule Vision.View.Picture do
-  @moduledoc "A JPEG picture of a frame; `at_ms` is the frame's time."
+  @moduledoc "Holds a JPEG picture of a frame; `at_ms` is the frame's time."
 
   @enforce_keys [:jpeg, :width, :height, :at_ms]
   defstruct @enforce_keys

@@ -4,8 +4,8 @@ defmodule Vision.View.Server do
   with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
   the camera or ffmpeg.
   """
-  use GenServer
-  alias Hal.{Frame, HardenedServer}
+  use Hal.HardenedServer
+  alias Hal.Frame
   alias Hal.Device.Words
   alias Vision.View.{EncoderControl, Subscribers}
 
@@ -68,8 +68,6 @@ defmodule Vision.View.Server do
     end
   end
 
-  def handle_call(_unknown, _from, s), do: HardenedServer.drop(s)
-
   @impl GenServer
   def handle_cast({:frame, %Frame{} = frame}, s), do: {:noreply, s |> begin(frame) |> look()}
   def handle_cast({:camera, condition}, s), do: {:noreply, %{s | camera: condition}}
@@ -81,8 +79,6 @@ defmodule Vision.View.Server do
   # Tried again at the next request.
   def handle_cast(:no_frames, s),
     do: {:noreply, refuse(s, "this camera gives coloured blobs, and no pictures")}
-
-  def handle_cast(_unknown, s), do: HardenedServer.drop(s)
 
   @impl GenServer
   def handle_info(:look, s), do: {:noreply, look(%{s | timer: nil})}
@@ -100,7 +96,7 @@ defmodule Vision.View.Server do
   end
 
   def handle_info(message, s) do
-    case EncoderControl.handle(s.maker, message, now()) do
+    case EncoderControl.handle(s.maker, message, Hal.Clock.now_ms()) do
       {:picture, picture, maker} -> {:noreply, %{s | maker: maker} |> show(picture) |> look()}
       {:ok, maker} -> {:noreply, %{s | maker: maker}}
       {:error, line, maker} -> {:noreply, %{s | maker: maker} |> refuse(line) |> look()}
@@ -114,7 +110,7 @@ defmodule Vision.View.Server do
 
   defp join(s, id, every) do
     with :ok <- EncoderControl.able(s.maker),
-         {:ok, subscribers} <- Subscribers.join(s.subscribers, id, every, now()) do
+         {:ok, subscribers} <- Subscribers.join(s.subscribers, id, every, Hal.Clock.now_ms()) do
       {:ok, %{s | subscribers: subscribers}}
     else
       {:error, :full} -> {:error, "#{Subscribers.size(s.subscribers)} viewers are the maximum"}
@@ -137,7 +133,7 @@ defmodule Vision.View.Server do
   defp look(s) do
     if s.timer, do: Process.cancel_timer(s.timer)
 
-    case wait(s, now()) do
+    case wait(s, Hal.Clock.now_ms()) do
       0 ->
         :atomics.put(s.demand, 1, 1)
         %{s | timer: nil}
@@ -159,7 +155,7 @@ defmodule Vision.View.Server do
   # A frame that was still on its way when its last viewer left, or the encoder failed, is
   # dropped.
   defp begin(s, frame) do
-    now = now()
+    now = Hal.Clock.now_ms()
 
     with 0 <- wait(s, now), {:error, line, maker} <- EncoderControl.begin(s.maker, frame, now) do
       refuse(%{s | maker: maker}, line)
@@ -170,7 +166,7 @@ defmodule Vision.View.Server do
   end
 
   defp show(s, picture) do
-    {ids, subscribers} = Subscribers.serve(s.subscribers, now())
+    {ids, subscribers} = Subscribers.serve(s.subscribers, Hal.Clock.now_ms())
     for id <- ids, do: hand_over(id, s.people, picture)
     %{s | subscribers: subscribers}
   end
@@ -200,5 +196,4 @@ defmodule Vision.View.Server do
   defp why_none(s), do: "the camera gave no frame within #{s.snapshot_ms} ms"
 
   # Not the robot's clock, which may be that of a simulator: pictures are made for people.
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -88,7 +88,10 @@ defmodule Mix.Tasks.BlobsTest do
     words = [graph, "--colours", colours]
     assert refused(words) =~ "a filter graph can write files"
     refute File.exists?(out)
-    assert refused(["gopher://x/1", "--colours", colours]) =~ "gopher:// is not a scheme"
+
+    assert refused(["gopher://x/1", "--colours", colours]) =~
+             "gopher://x/1: expected a stream by rtsp, "
+
     assert capture_io(fn -> Blobs.run(words ++ ["--unsafe"]) end) =~ "10 blobs"
     assert File.exists?(out)
   end

@@ -1,7 +1,7 @@
 defmodule Bench.Soak.Fleet.Network do
   @moduledoc """
-  The network of a run: a namespace for each robot where this machine allows it (`Vm.Net`), so that links can be
-  cut, else the loopback interface, where each node has ports of its own. Runs beside each other share nothing.
+  Provides the network of a run: a namespace for each robot where this machine allows it (`Vm.Net`), so that links can
+  be cut, else the loopback interface, where each node has ports of its own. Runs beside each other share nothing.
   """
   alias Mesh.Distribution.Epmd
   alias Mesh.Secret

@@ -1,5 +1,5 @@
 defmodule Bench.Soak.Fleet.Tree do
-  @moduledoc "The processes of a node's swarm and robot: what runs, and the death of one of them."
+  @moduledoc "Lists the processes of a node's swarm and robot, and kills one of them."
   alias Robot.Names
 
   @doc "The processes of swarm and robot, by what they are, sorted. Two that are the same have the same words."

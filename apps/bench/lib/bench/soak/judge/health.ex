@@ -98,9 +98,8 @@ defmodule Bench.Soak.Judge.Health do
     end
   end
 
-  @doc "What a robot lacks itself, in words."
-  @spec faults(t(), atom(), integer()) :: [String.t()]
-  def faults(health, robot, now) do
+  # What a robot lacks itself, in words.
+  defp faults(health, robot, now) do
     case health.probes[robot] do
       {probe, us} when now - us <= @stale_us ->
         lost = Map.get(health.expected, robot, []) -- probe.processes

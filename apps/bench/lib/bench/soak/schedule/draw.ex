@@ -1,7 +1,9 @@
 defmodule Bench.Soak.Schedule.Draw do
   @moduledoc "Draws deeds of `bin/soak`, and what they are made of, from a state of `:rand`. Pure."
 
-  @type random :: :rand.state()
+  import Sim.Chaos.Random, only: [pick: 2, whole: 3]
+
+  @type random :: Sim.Chaos.Random.t()
 
   @doc "A deed of a kind that lasts for itself, as in `Bench.Soak.Schedule`."
   @spec one(atom(), [atom(), ...], random()) :: {tuple() | atom(), random()}
@@ -48,31 +50,5 @@ defmodule Bench.Soak.Schedule.Draw do
     {x, random} = :rand.uniform_s(random)
     {y, random} = :rand.uniform_s(random)
     {{:landmark, {x - 0.5, y - 0.5}}, random}
-  end
-
-  @doc "A whole number from one to another, both included."
-  @spec whole(random(), integer(), integer()) :: {integer(), random()}
-  def whole(random, from, to) do
-    {n, random} = :rand.uniform_s(to - from + 1, random)
-    {from + n - 1, random}
-  end
-
-  @doc "One of these."
-  @spec pick(random(), [term(), ...]) :: {term(), random()}
-  def pick(random, all) do
-    {n, random} = whole(random, 0, length(all) - 1)
-    {Enum.at(all, n), random}
-  end
-
-  @doc "These in another order."
-  @spec shuffle(random(), [term()]) :: {[term()], random()}
-  def shuffle(random, all) do
-    {keyed, random} =
-      Enum.map_reduce(all, random, fn one, random ->
-        {key, random} = :rand.uniform_s(random)
-        {{key, one}, random}
-      end)
-
-    {for({_key, one} <- Enum.sort(keyed), do: one), random}
   end
 end

@@ -1,6 +1,6 @@
 defmodule Bench.Soak.WorldHost.Line do
   @moduledoc """
-  The world's end of a robot's line to it, over a socket of the file system; the robot's end is
+  Holds the world's end of a robot's line to it, over a socket of the file system; the robot's end is
   `Bench.Soak.WorldHost.Link`. It stands in for the robot's devices: it attaches processes of its own to the world's
   server, which end with it.
   """

@@ -1,8 +1,8 @@
 defmodule Bench.Soak.WorldHost.Link do
   @moduledoc """
-  A robot's end of its line to the world, which runs in a process of the operating system of its own
-  (`Bench.Soak.WorldHost`). The line is a socket of the file system, so no cut of the network touches
-  it: bodies are in the world whatever the radios do.
+  Holds a robot's end of its line to the world, which runs in a process of the operating system of its own
+  (`Bench.Soak.WorldHost`). The line is a socket of the file system, so no cut of the network touches it: bodies are in
+  the world whatever the radios do.
 
   To the robot's simulated devices this process is the world's server: they find it in
   `Sim.World.Directory`, send it what `Sim.World.Server` gets, and see it end when the world ends.

@@ -1,5 +1,5 @@
 defmodule Console.Live.Mesh.Notice do
-  @moduledoc "Why no robot of a mesh is shown, or not the one that was meant, in one line for people. Pure."
+  @moduledoc "Explains in one line for people why no robot of a mesh is shown, or not the one that was meant. Pure."
 
   # Nodes of another secret go on sending; for so long after the last of their datagrams they are told of.
   @stranger_ms 10_000

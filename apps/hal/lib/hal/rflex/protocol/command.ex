@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Protocol.Command do
   @moduledoc """
-  All commands to the controller, as bytes to write to the line. Pure; raw units.
+  Encodes the commands to the controller as bytes to write to the line. Pure; raw units.
 
   Axis 0 moves, axis 1 turns. A speed is always two frames, one for each axis. Torques and the
   acceleration of axis 1 are the constants that public drivers send.
@@ -95,13 +95,6 @@ defmodule Hal.RFlex.Protocol.Command do
     plain(speed)
   end
 
-  @doc "Drives an axis to a position. Defined by the protocol, but no known driver uses it."
-  @spec position(axis(), non_neg_integer(), non_neg_integer(), integer()) :: binary()
-  def position(axis, speed, acceleration, position) do
-    torque = elem(@torque, axis)
-    frame(2, 8, <<axis, speed::32, acceleration::32, torque::32, position::signed-32>>)
-  end
-
   @doc """
   Starts the sonars: listening time per ping, pause after it, pause after a sweep; microseconds.
   """
@@ -127,10 +120,6 @@ defmodule Hal.RFlex.Protocol.Command do
   @doc "Requests the state of the joystick."
   @spec joystick() :: binary()
   def joystick, do: frame(3, 0, <<>>)
-
-  @doc "Requests the screen, row by row. Defined by the protocol, but no known driver uses it."
-  @spec screen() :: binary()
-  def screen, do: frame(1, 0, <<>>)
 
   defp axis(axis, speed, acceleration) do
     direction = if speed < 0, do: 0, else: 1

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Protocol.Packet do
   @moduledoc """
-  One frame of the rFLEX protocol, the same in both directions; integers are big-endian. Pure.
+  Holds one frame of the rFLEX protocol, the same in both directions; integers are big-endian. Pure.
 
       1B 02 | port | id | opcode | N | N bytes of data | checksum | 1B 03
 

@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Sensors.IndexSwitch do
   @moduledoc """
-  The switch that some bases (B21r) close at one absolute heading, read as a digital input. Pure.
+  Reads the switch that some bases (B21r) close at one absolute heading, as a digital input. Pure.
 
   It closes over a small angle: its first event records the heading, and a later one more than
   0.01 rad away makes the larger of the two the home heading. Older drivers then count all

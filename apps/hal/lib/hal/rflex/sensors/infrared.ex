@@ -1,6 +1,6 @@
 defmodule Hal.RFlex.Sensors.Infrared do
   @moduledoc """
-  The ranges of the infrareds from their voltages (a byte each). Pure.
+  Computes the ranges of the infrareds from their voltages (a byte each). Pure.
 
   Two laws are in use, with constants that differ from sensor to sensor:
 

@@ -1,10 +1,9 @@
 if Code.ensure_loaded?(Circuits.UART) do
   defmodule Hal.Serial.Circuits.Server do
     @moduledoc """
-    The process that holds a line of `Hal.Serial.Circuits`: it writes for the owner, sends it what
-    arrives as `{pid, {:data, bytes} | {:error, reason}}`, keeps the timer of its signs of life,
-    and writes the last words when the owner is silent or ends. After an error it only waits to be
-    closed.
+    Holds a line of `Hal.Serial.Circuits`: writes for the owner, sends it what arrives as `{pid, {:data, bytes} |
+    {:error, reason}}`, keeps the timer of its signs of life, and writes the last words when the owner is silent or
+    ends. After an error it only waits to be closed.
     """
     use GenServer
     alias Circuits.UART

@@ -48,15 +48,6 @@ defmodule Hal.RFlex.Protocol.CommandTest do
     end
   end
 
-  test "the screen and a position, which nobody uses" do
-    assert hex(Command.screen()) == "1b 02 01 00 00 00 01 1b 03"
-
-    assert {[%Packet{port: 2, opcode: 8, data: data}], _} =
-             Decoder.feed(Decoder.new(), Command.position(1, 10, 20, -30))
-
-    assert <<1, 10::32, 20::32, 35_000::32, -30::signed-32>> = data
-  end
-
   test "turning speeds with 1B in the second byte, as the public drivers send them" do
     for base <- [0, 0x10000, 0xA0000], low <- 0..0xFF do
       expected = if low > 127, do: base + 0x1C00, else: base + 0x1AFF

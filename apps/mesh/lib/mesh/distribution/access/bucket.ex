@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.Access.Bucket do
   @moduledoc """
-  The rate limit of one address: a token bucket. Pure; time in ms.
+  Limits the rate of one address by a token bucket. Pure; time in ms.
 
   An address may take `most` at once, and `per_minute` in the long run.
   """

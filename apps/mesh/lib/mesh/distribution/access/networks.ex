@@ -1,6 +1,7 @@
 defmodule Mesh.Distribution.Access.Networks do
   @moduledoc """
-  IPv4 networks as an operator writes them, `"10.0.0.20"` or `"10.0.1.0/24"`, and whether an address is in one. Pure.
+  Reads IPv4 networks as an operator writes them, `"10.0.0.20"` or `"10.0.1.0/24"`, and decides whether an address is in
+  one. Pure.
   """
   import Bitwise
 

@@ -1,7 +1,7 @@
 defmodule Mesh.Protocol.Packet.SequenceWindow do
   @moduledoc """
-  The sequence numbers of a session that were heard: each counts once, and one that is 1,024 or more
-  behind the newest not at all. Pure.
+  Remembers the sequence numbers of a session that were heard: each counts once, and one that is 1,024 or more behind
+  the newest not at all. Pure.
   """
   import Bitwise
 

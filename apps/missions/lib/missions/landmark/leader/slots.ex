@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Leader.Slots do
   @moduledoc """
-  The order of a leader's followers, and the shape in whose slots they stand. Pure.
+  Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
   """
   alias Missions.Landmark
   alias Missions.Landmark.{Merge, Rounds, Shape}

@@ -10,6 +10,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
   alias Robot.Behaviour.Avoid.{Echoes, Neighbours}
+  alias Robot.Navigation.Orca
 
   # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
   # looking (`Sim.GateAloneTest`; docs/results.md, section 6). A base may have few sonars behind.
@@ -98,13 +99,11 @@ defmodule Robot.Behaviour.Avoid.Caution do
 
   def wish(%Wish{twist: twist, velocity: velocity} = wish) do
     linear = twist.linear |> min(@speed) |> max(-@backwards)
-    %{wish | twist: Twist.new(linear, twist.turn), velocity: shorten(velocity, @speed)}
-  end
 
-  defp shorten(nil, _most), do: nil
-
-  defp shorten({x, y} = velocity, most) do
-    speed = :math.sqrt(x * x + y * y)
-    if speed > most, do: {x * most / speed, y * most / speed}, else: velocity
+    %{
+      wish
+      | twist: Twist.new(linear, twist.turn),
+        velocity: velocity && Orca.clip(velocity, @speed)
+    }
   end
 end

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Avoid.Clearance do
   @moduledoc """
-  The distances that a robot keeps from robots and obstacles, as half-planes of velocities for
+  Expresses the distances that a robot keeps from robots and obstacles, as half-planes of velocities for
   `Robot.Navigation.Orca`. Pure.
   """
   alias Hal.Pose

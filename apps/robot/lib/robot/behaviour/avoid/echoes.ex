@@ -1,6 +1,7 @@
 defmodule Robot.Behaviour.Avoid.Echoes do
   @moduledoc """
-  Where a robot's sonars have seen something lately, and since when: what has stayed where it is, is no robot that drives. Pure.
+  Remembers where a robot's sonars have seen something lately, and since when: what has stayed where it is, is no robot
+  that drives. Pure.
 
   A place is forgotten after 5 s, or as soon as a sonar sees through it.
   """

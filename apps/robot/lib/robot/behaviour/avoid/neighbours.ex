@@ -1,7 +1,7 @@
 defmodule Robot.Behaviour.Avoid.Neighbours do
   @moduledoc """
-  The surroundings of a robot as discs in the map frame: other robots by their own reports, and
-  obstacles that the sonars see and that are not known robots or discs. Pure.
+  Describes the surroundings of a robot as discs in the map frame: other robots by their own reports, and obstacles that
+  the sonars see and that are not known robots or discs. Pure.
   """
   alias Hal.{Pose, Twist}
   alias Robot.Navigation.Grid

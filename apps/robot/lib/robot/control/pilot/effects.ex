@@ -1,6 +1,6 @@
 defmodule Robot.Control.Pilot.Effects do
   @moduledoc """
-  Carries out the effects of a mission.
+  Carries out the effects of a mission (`Robot.Mission.Runner.actions/1`).
 
   | effect | goes to |
   |---|---|
@@ -11,28 +11,24 @@ defmodule Robot.Control.Pilot.Effects do
   """
   alias Hal.Event
   alias Robot.Control.Executive
-  alias Robot.Trace
   alias Robot.Localiser.Anchors
-  import Robot.Mission, only: [is_order: 1]
+  alias Robot.Mission.Runner
+  alias Robot.Trace
 
   @doc "Carries out one effect, and records it in the trace."
   @spec carry_out(Robot.Mission.effect(), Robot.Config.t()) :: :ok
   def carry_out(effect, config) do
     at_ms = Robot.Config.now(config)
     Trace.effect(config, :pilot, effect, at_ms)
-    _ = carry_out(effect, config, at_ms)
-    :ok
+    Enum.each(Runner.actions(effect), &carry_out(&1, config, at_ms))
   end
 
-  defp carry_out(order, config, _at_ms) when is_order(order), do: Executive.obey(config.id, order)
+  defp carry_out({:obey, order}, config, _at_ms), do: Executive.obey(config.id, order)
 
   defp carry_out({:send, _to, _message}, %{send: nil}, _at_ms), do: :ok
 
   defp carry_out({:send, to, message}, %{send: {m, f, a}}, _at_ms),
     do: apply(m, f, a ++ [to, message])
-
-  # The runner keeps the claim.
-  defp carry_out({:claim, _claim}, _config, _at_ms), do: :ok
 
   defp carry_out({:stage, stage, about}, config, at_ms) do
     about = Map.merge(%{robot: config.id, stage: stage}, about)

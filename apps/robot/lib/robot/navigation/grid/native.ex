@@ -2,20 +2,7 @@ defmodule Robot.Navigation.Grid.Native do
   @moduledoc false
   # The kernels in C; `Robot.Navigation.Grid` documents them. The C code checks every size: wrong terms
   # raise ArgumentError.
-  @on_load :load
-
-  @doc false
-  @spec load() :: :ok
-  def load do
-    # Without the library the stubs remain, and the reference does the work.
-    _ = :erlang.load_nif(to_charlist(Application.app_dir(:robot, "priv/grid")), 0)
-    :ok
-  end
-
-  @spec loaded?() :: boolean()
-  # The library replaces this. From a plain `false`, compilers that infer types would conclude
-  # that it is never loaded.
-  def loaded?, do: not function_exported?(__MODULE__, :loaded?, 0)
+  use Hal.Nif, app: :robot, library: "grid"
 
   @spec clearance(binary(), pos_integer(), pos_integer(), float(), boolean()) :: binary()
   def clearance(_cells, _width, _height, _cell, _closed?), do: :erlang.nif_error(:nif_not_loaded)

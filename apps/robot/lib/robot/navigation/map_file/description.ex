@@ -116,7 +116,7 @@ defmodule Robot.Navigation.MapFile.Description do
   defp image(%{"image" => text}) do
     case unquoted(text) do
       {:ok, file} when file != "" -> {:ok, file}
-      _none -> {:error, "image must be the name of a PNG or PGM file"}
+      _none -> {:error, "image: expected the name of a PNG or PGM file"}
     end
   end
 
@@ -138,7 +138,7 @@ defmodule Robot.Navigation.MapFile.Description do
         {:ok, number}
 
       _wrong ->
-        {:error, "#{key} cannot be #{keys[key]}: a number from #{least} to #{most} is allowed"}
+        {:error, "#{key}: expected a number from #{least} to #{most}, got #{keys[key]}"}
     end
   end
 
@@ -164,16 +164,16 @@ defmodule Robot.Navigation.MapFile.Description do
         else:
           {:error, "origin #{text} is turned, which is not supported: turn the picture instead"}
     else
-      _other -> {:error, "origin cannot be #{text}: [x, y, 0.0] in metres is allowed"}
+      _other -> {:error, "origin: expected [x, y, 0.0] in metres, got #{text}"}
     end
   end
 
   defp negate(text) when text in ~w(0 false), do: {:ok, false}
   defp negate(text) when text in ~w(1 true), do: {:ok, true}
-  defp negate(text), do: {:error, "negate cannot be #{text}: 0 or 1 is allowed"}
+  defp negate(text), do: {:error, "negate: expected 0 or 1, got #{text}"}
 
   defp mode(text) when text in ~w(trinary scale), do: :ok
-  defp mode(text), do: {:error, "mode cannot be #{text}: trinary or scale is allowed"}
+  defp mode(text), do: {:error, "mode: expected trinary or scale, got #{text}"}
 
   defp shades(free, light?) do
     Robot.Navigation.MapFile.Runs.marks(fn shade ->

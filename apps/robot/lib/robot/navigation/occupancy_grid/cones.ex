@@ -39,10 +39,6 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
   @spec thick() :: float()
   def thick, do: @thick
 
-  @doc "How far a cone reaches at most, metres."
-  @spec reach() :: float()
-  def reach, do: @through
-
   @doc "Whether the readings of a percept say something new after those of `last_ms`, which were taken at this odometry."
   @spec due?(Percept.t(), last_ms :: integer() | nil, Pose.t() | nil) :: boolean()
   def due?(%Percept{sonar: nil}, _last_ms, _last), do: false

@@ -46,7 +46,9 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
 
     for written <- ["image: \"floor.pgm", "image: 'floor.pgm\"", "image: ''", "image: \"a\" b"],
         do:
-          assert({:error, "image must be" <> _} = Description.parse(with_line("image", written)))
+          assert(
+            {:error, "image: expected" <> _} = Description.parse(with_line("image", written))
+          )
   end
 
   test "what is not surely free is wall" do
@@ -65,23 +67,24 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
     for {yaml, pattern} <- [
           {"", ~r/^image is missing; needed are image, resolution, origin$/},
           {<<0xFF, 0xFE>>, ~r/^is not text$/},
-          {with_line("image", "image:"), ~r/^image must be the name/},
-          {with_line("resolution", "resolution: fine"), ~r/^resolution cannot be fine: a number/},
+          {with_line("image", "image:"), ~r/^image: expected the name/},
+          {with_line("resolution", "resolution: fine"), ~r/^resolution: expected a number/},
           {with_line("resolution", "resolution: 0"),
-           ~r/^resolution cannot be 0: a number from 0.001/},
-          {with_line("resolution", "resolution: 1e99"), ~r/^resolution cannot be 1e99/},
-          {with_line("resolution", "resolution: 1e-99"), ~r/^resolution cannot be 1e-99/},
-          {with_line("origin", "origin: 3"), ~r/^origin cannot be 3: \[x, y, 0.0\]/},
-          {with_line("origin", "origin: [1.0]"), ~r/^origin cannot be/},
-          {with_line("origin", "origin: [a, b, c]"), ~r/^origin cannot be/},
+           ~r/^resolution: expected a number from 0.001/},
+          {with_line("resolution", "resolution: 1e99"), ~r/^resolution: expected .*, got 1e99/},
+          {with_line("resolution", "resolution: 1e-99"), ~r/^resolution: expected .*, got 1e-99/},
+          {with_line("origin", "origin: 3"), ~r/^origin: expected \[x, y, 0.0\]/},
+          {with_line("origin", "origin: [1.0]"), ~r/^origin: expected/},
+          {with_line("origin", "origin: [a, b, c]"), ~r/^origin: expected/},
           {with_line("origin", "origin: [0, 0, 1.57]"), ~r/^origin .* is turned/},
-          {with_line("occupied_thresh", "occupied_thresh: 7"), ~r/^occupied_thresh cannot be 7/},
-          {with_line("negate", "negate: 2"), ~r/^negate cannot be 2: 0 or 1/},
-          {with_line("mode", "mode: raw"), ~r/^mode cannot be raw/},
+          {with_line("occupied_thresh", "occupied_thresh: 7"),
+           ~r/^occupied_thresh: expected .*, got 7/},
+          {with_line("negate", "negate: 2"), ~r/^negate: expected 0 or 1/},
+          {with_line("mode", "mode: raw"), ~r/^mode: expected .*, got raw/},
           {@yaml <> "resolution: 0.1\n", ~r/^resolution is given twice$/},
           {@yaml <> "origin:\n- 0\n- 0\n", ~r/^origin is given twice$/},
-          {with_line("origin", "origin:\n- -1.0 -3.0\n- 0.0"), ~r/^origin cannot be/},
-          {with_line("origin", "origin:"), ~r/^origin cannot be \[\]/}
+          {with_line("origin", "origin:\n- -1.0 -3.0\n- 0.0"), ~r/^origin: expected/},
+          {with_line("origin", "origin:"), ~r/^origin: expected .*, got \[\]/}
         ] do
       assert {:error, line} = Description.parse(yaml)
       assert line =~ pattern

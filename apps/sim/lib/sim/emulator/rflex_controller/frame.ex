@@ -1,6 +1,6 @@
 defmodule Sim.Emulator.RFlexController.Frame do
   @moduledoc """
-  Frames as the controller sends and receives them (fact sheet rFLEX, sections 2 and 13). Pure.
+  Frames bytes as the controller sends and receives them (fact sheet rFLEX, sections 2 and 13). Pure.
 
       1B 02 | port | id | opcode | N | N bytes | checksum | 1B 03
 

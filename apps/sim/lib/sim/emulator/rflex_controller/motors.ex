@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.RFlexController.Motors do
   @moduledoc """
-  Both axes of the controller, forward and turn: commanded speeds with their accelerations, the
-  brake, the stop when commands are missing, and the counters. Pure; counts are in the
-  controller's units, times in milliseconds.
+  Emulates both axes of the controller, forward and turn: commanded speeds with their accelerations, the brake, the stop
+  when commands are missing, and the counters. Pure; counts are in the controller's units, times in milliseconds.
 
   Where the sheet leaves it open: an acceleration of 0 keeps the previous one; a set brake stops
   the wheels at once, and no speed is accepted while it is set; an axis gets no faster than a base

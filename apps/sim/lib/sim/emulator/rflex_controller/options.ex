@@ -1,7 +1,6 @@
 defmodule Sim.Emulator.RFlexController.Options do
   @moduledoc """
-  The checked options of an emulated controller. Pure. All options have defaults, which depend on
-  the `:kind`.
+  Checks the options of an emulated controller. Pure. All options have defaults, which depend on the `:kind`.
 
   | option | allowed | meaning |
   |---|---|---|
@@ -88,7 +87,7 @@ defmodule Sim.Emulator.RFlexController.Options do
       iex> {options.conversions[:angle], options.timeout_ms}
       {60000, :off}
       iex> Sim.Emulator.RFlexController.Options.check(ghost: :yes)
-      {:error, "controller option ghost cannot be :yes: :off, :infrared or :all is allowed"}
+      {:error, "controller option ghost: expected :off, :infrared or :all, got :yes"}
   """
   @spec check(keyword()) :: {:ok, map()} | {:error, line :: String.t()}
   def check(asked) do

@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.ViscaCamera.Head do
   @moduledoc """
-  The moving parts of the camera: pan and tilt with the rates of their speed numbers, and zoom
-  (fact sheet VISCA, section 5). Pure; positions in the camera's units (pan to the right, tilt up,
-  zoom to tele positive), times in milliseconds.
+  Moves the parts of the camera: pan and tilt with the rates of their speed numbers, and zoom (fact sheet VISCA, section
+  5). Pure; positions in the camera's units (pan to the right, tilt up, zoom to tele positive), times in milliseconds.
 
   An axis goes to a position or drives until it is stopped or at its end. Pan and tilt move
   independently; a path may have several corners.

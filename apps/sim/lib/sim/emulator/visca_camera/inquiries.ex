@@ -1,5 +1,5 @@
 defmodule Sim.Emulator.ViscaCamera.Inquiries do
-  @moduledoc "The inquiries to a camera, and its answers (fact sheet VISCA, section 4). Pure."
+  @moduledoc "Answers the inquiries to a camera (fact sheet VISCA, section 4). Pure."
   alias Sim.Emulator.ViscaCamera
   alias Sim.Emulator.ViscaCamera.{Head, Packet}
 

@@ -1,6 +1,6 @@
 defmodule Sim.Emulator.ViscaCamera.Options do
   @moduledoc """
-  The checked options of an emulated camera. Pure.
+  Checks the options of an emulated camera. Pure.
 
   | option | allowed | default |
   |---|---|---|
@@ -40,7 +40,7 @@ defmodule Sim.Emulator.ViscaCamera.Options do
       iex> {options.latency_ms, options.power}
       {5, :on}
       iex> Sim.Emulator.ViscaCamera.Options.check(power: 1)
-      {:error, "emulated camera option power cannot be 1: :on or :off is allowed"}
+      {:error, "emulated camera option power: expected :on or :off, got 1"}
   """
   @spec check(keyword()) :: {:ok, map()} | {:error, line :: String.t()}
   def check(asked) do

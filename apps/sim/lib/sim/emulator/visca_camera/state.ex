@@ -1,7 +1,6 @@
 defmodule Sim.Emulator.ViscaCamera.State do
   @moduledoc """
-  The state of a camera: its head, its two sockets, and its pending answers. Pure; times in
-  milliseconds.
+  Holds the state of a camera: its head, its two sockets, and its pending answers. Pure; times in milliseconds.
 
   A socket is free (`nil`) or holds what its command waits for: `:way`, `:zoom`, `:drive` or `{:until, at_ms}`.
   """

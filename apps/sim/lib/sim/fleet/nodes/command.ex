@@ -1,6 +1,6 @@
 defmodule Sim.Fleet.Nodes.Command do
   @moduledoc """
-  The commands that start a node, and those by which a person reaches it, as text. Pure.
+  Writes the commands that start a node, and those by which a person reaches it, as text. Pure.
   """
 
   @doc """

@@ -1,5 +1,5 @@
 defmodule Sim.Fleet.Nodes.Config do
-  @moduledoc "The configuration of a fleet's node, encoded as one line of text and decoded. Pure."
+  @moduledoc "Encodes the configuration of a fleet's node as one line of text, and decodes it. Pure."
 
   @enforce_keys [:node, :launcher, :mesh, :part]
   defstruct @enforce_keys

@@ -1,8 +1,7 @@
 defmodule Sim.Fleet.Nodes.PortMapper do
   @moduledoc """
-  Erlang's port mapper (epmd) for the duration of a run: if none answers, one is started, which
-  ends with the run in any case. An existing one is left alone, and so is ours while others use
-  it.
+  Provides Erlang's port mapper (epmd) for the duration of a run: if none answers, one is started, which ends with the
+  run in any case. An existing one is left alone, and so is ours while others use it.
   """
 
   @host "127.0.0.1"
@@ -38,7 +37,7 @@ defmodule Sim.Fleet.Nodes.PortMapper do
     if not there?() and File.exists?(program) do
       # A daemon does not hold our terminal. It returns before it listens.
       System.cmd(program, ["-daemon"], env: [{"ERL_EPMD_ADDRESS", @host}])
-      await(now() + @up_ms)
+      await(Hal.Clock.now_ms() + @up_ms)
       sh = System.find_executable("sh")
       options = [:exit_status, :hide, args: ["-c", @keeper, "keeper", program]]
       Port.open({:spawn_executable, sh}, options)
@@ -62,7 +61,7 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   end
 
   defp await(deadline) do
-    if not there?() and now() < deadline do
+    if not there?() and Hal.Clock.now_ms() < deadline do
       receive do
       after
         20 -> await(deadline)
@@ -85,6 +84,4 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   end
 
   defp erts, do: Path.join([:code.root_dir(), "erts-#{:erlang.system_info(:version)}", "bin"])
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -1,5 +1,5 @@
 defmodule Sim.Floorplan.Maps.Rough do
-  @moduledoc "Maps with few right angles: a lab with diagonal walls, and a cave. Pure."
+  @moduledoc "Draws maps with few right angles: a lab with diagonal walls, and a cave. Pure."
   alias Sim.Floorplan.{Drawing, Shape}
   alias Sim.Noise
 
