@@ -75,7 +75,7 @@ defmodule Sim.Floorplan.MapsTest do
     end
 
     for name <- ["rooms:", "rooms:-1", "rooms:x", "rooms:4294967296"],
-        do: assert({:error, "unknown map rooms:" <> _} = Floorplan.open(name, 5))
+        do: assert({:error, "map: expected rooms:SEED" <> _} = Floorplan.open(name, 5))
   end
 
   test "the narrow door is 0.9 m wide, and diagonal walls are whole" do
