@@ -206,7 +206,7 @@ defmodule System.DemoRefusesTest do
       ~s(--robots cannot be "-3": a whole number),
       ~s(--robots cannot be "1e9": a whole number),
       ~s(--map cannot be "moon": hall, hospital, arena, clinic, ),
-      ~s(doorway, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed),
+      ~s(doorway, rooms, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT is allowed),
       ~s(--loss cannot be "nan": a number from 0 to 1 is allowed),
       "did you mean --headless?",
       "did you mean --hardware?",
