@@ -206,7 +206,7 @@ defmodule System.DemoRefusesTest do
       ~s(--robots: expected a whole number),
       ~s(--robots: expected a whole number),
       ~s(--map: expected hall, hospital, arena, clinic, ),
-      ~s(doorway, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT, got "moon"),
+      ~s(doorway, rooms, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:WIDTHxHEIGHT, got "moon"),
       ~s(--loss: expected a number from 0 to 1, got "nan"),
       "did you mean --headless?",
       "did you mean --hardware?",
