@@ -133,8 +133,8 @@ defmodule Robot.Localiser do
 
   @doc """
   Moves the estimate by the percept's odometry, corrects it by the percept's detections and, if its
-  `grid` is a floor plan, by its sonars, and fills in the percept's `pose` and `uncertainty`, and the pose of its detections. Without odometry
-  there is no pose.
+  `grid` is a floor plan, by its sonars, and fills in the percept's `pose` and `uncertainty`, and
+  the pose of its detections. Without odometry there is no pose.
   """
   @spec update(t(), Percept.t()) :: {Percept.t(), t()}
   def update(localiser, %Percept{odometry: nil} = percept),
