@@ -52,7 +52,7 @@ defmodule Hal.CommandOutput do
           refuse(unknown(option, parser[:strict]))
 
         {_options, _words, [{option, text} | _]} ->
-          refuse("#{option}: expected another value, got #{text}")
+          refuse("#{option}: expected #{value(option, parser[:strict])}, got #{text}")
 
         {options, words, []} ->
           if options[:help], do: help(help), else: told(carry_out.(options, words))
@@ -65,9 +65,20 @@ defmodule Hal.CommandOutput do
   defp told({:error, lines}), do: refuse(lines)
   defp told(result), do: result
 
+  # A text can be any.
+  defp value(option, switches) do
+    type = Enum.find_value(switches, fn {name, type} -> if switch(name) == option, do: type end)
+    if type == :boolean, do: "no value", else: "a whole number"
+  end
+
+  defp switch(name), do: "--" <> String.replace("#{name}", "_", "-")
+
   defp unknown(option, switches) do
-    names = for {name, _type} <- switches, do: "--" <> String.replace("#{name}", "_", "-")
-    "unknown option #{option}#{Suggest.hint(option, names)}"
+    names = for {name, _type} <- switches, do: switch(name)
+
+    if option in names,
+      do: "#{option} needs a value",
+      else: "unknown option #{option}#{Suggest.hint(option, names)}"
   end
 
   @doc "Prints errors of a Mix task, and ends it with status 1."
