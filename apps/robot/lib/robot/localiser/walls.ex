@@ -21,6 +21,8 @@ defmodule Robot.Localiser.Walls do
   # A round of readings is taken after so much way or turn (metres, radians).
   @moved 0.25
   @turned 0.2
+  # The sonars of a robot that turns faster than this within a round of them point elsewhere by then (radians).
+  @blurred 0.2
   # Walls between these (metres) count.
   @near 0.2
   @far 4.5
@@ -46,7 +48,7 @@ defmodule Robot.Localiser.Walls do
       walls.at == nil ->
         {%{walls | at: now, dead: belief}, belief}
 
-      Cones.moved?(walls.at, now, @moved, @turned) ->
+      Cones.moved?(walls.at, now, @moved, @turned) and not blurred?(percept) ->
         dead = Belief.move(walls.dead, Pose.relative(walls.at, now))
         listen(%{walls | at: now, dead: dead}, belief, percept)
 
@@ -56,6 +58,9 @@ defmodule Robot.Localiser.Walls do
   end
 
   def correct(walls, belief, _percept), do: {walls, belief}
+
+  defp blurred?(%{odometry: odometry, profile: profile}),
+    do: abs(odometry.twist.turn) * profile.sonar_round_s > @blurred
 
   defp listen(walls, belief, percept) do
     if vague?(belief) do
@@ -79,7 +84,7 @@ defmodule Robot.Localiser.Walls do
   defp follow(:fair, walls, _belief, corrected, _trusted?), do: {walls, corrected}
   defp follow(:unfair, walls, belief, _corrected, _trusted?), do: {walls, belief}
   defp follow(:wrong, walls, _belief, _corrected, true), do: {walls, walls.dead}
-  defp follow(:wrong, walls, belief, _corrected, false), do: {walls, belief}
+  defp follow(:wrong, walls, belief, _corrected, false), do: {%{walls | dead: belief}, belief}
 
   # One reading after the other, so that the second one by the same wall is expected where the first one was.
   defp round(belief, %{profile: profile, odometry: odometry} = percept) do
