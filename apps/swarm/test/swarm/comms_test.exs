@@ -177,7 +177,9 @@ defmodule Swarm.CommsTest do
     assert Swarm.ask(id, {:goto, :far, 0.0, nil}) |> elem(1) =~
              "goto: expected a number from -10000 to 10000, got :far"
 
-    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~ "{:dance, 1} is not a command"
+    assert Swarm.ask(id, {:dance, 1}) |> elem(1) =~
+             "expected a command of Robot.Command, got {:dance, 1}"
+
     assert Swarm.ask(id, {:start, [assign: :luck]}) |> elem(1) =~ "assign"
     assert parts(id, [:comms, :pilot, :executive, :gate]) == parts
   end

@@ -108,7 +108,12 @@ defmodule Robot.Safety.ArmingTest do
     stands(300)
     assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
     assert {:ok, nil, _at_ms} = Board.fetch(Board.find!(id), :goal, :infinity)
-    assert {:ok, %{limits: [], twist: twist}, _} = Board.fetch(Board.find!(id), :driving, 200)
+    # On a busy machine a wish of its executive may be late, which the gate limits, too.
+    eventually(fn ->
+      match?({:ok, %{limits: []}, _}, Board.fetch(Board.find!(id), :driving, 200))
+    end)
+
+    assert {:ok, %{twist: twist}, _} = Board.fetch(Board.find!(id), :driving, 200)
     assert Twist.zero?(twist)
   end
 
