@@ -73,7 +73,7 @@ defmodule Sim.Floorplan.Maps do
   @spec fault(String.t()) :: {allowed :: String.t(), hint :: String.t()}
   def fault(name) do
     {file, size} = parts(name)
-    first..last = @seeds
+    %{first: first, last: last} = @seeds
     kind = file |> Path.extname() |> String.downcase()
 
     cond do
