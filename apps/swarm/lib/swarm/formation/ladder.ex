@@ -26,8 +26,9 @@ defmodule Swarm.Formation.Ladder do
   # Places are looked for along a trail in steps of this share of the spacing, and up to this many.
   @stride 0.5
   @strides 60
-  # The gap between robots of a cluster, from edge to edge, and how many places round the leader are tried.
-  @apart 0.6
+  # The gaps between robots of a cluster, from edge to edge: the first with which all see their leader, else the last.
+  # How many places round the leader are tried.
+  @apart [0.6, 0.4]
   @most 400
 
   @type rung :: :asked | :turned | :closer | :column | :cluster
@@ -120,15 +121,11 @@ defmodule Swarm.Formation.Ladder do
   end
 
   defp rung(:cluster, asked, followers, here, space) do
-    start = Pose.point(here.pose)
-    step = 2 * space.radius + @apart
-    found = flood(:gb_sets.singleton({0.0, {0, 0}}), MapSet.new([{0, 0}]), [], step, here, space)
-
-    spots =
-      for point <- found |> Enum.reverse() |> List.delete(start) |> Enum.take(followers),
-          do: facing(point, here)
-
-    if length(spots) == followers, do: told(asked, spots)
+    clusters = for apart <- @apart, spots = cluster(apart, followers, here, space), do: spots
+    leader = Pose.point(here.pose)
+    near? = fn spots -> Enum.all?(spots, &Space.joined?(space, &1, leader)) end
+    spots = Enum.find(clusters, near?) || List.last(clusters)
+    if spots, do: told(asked, spots)
   end
 
   defp turned(turns, asked, followers, here, space) do
@@ -142,6 +139,18 @@ defmodule Swarm.Formation.Ladder do
            linked?(spots, here, space),
          do: told(asked, spots)
     end)
+  end
+
+  defp cluster(apart, followers, here, space) do
+    start = Pose.point(here.pose)
+    step = 2 * space.radius + apart
+    found = flood(:gb_sets.singleton({0.0, {0, 0}}), MapSet.new([{0, 0}]), [], step, here, space)
+
+    spots =
+      for point <- found |> Enum.reverse() |> List.delete(start) |> Enum.take(followers),
+          do: facing(point, here)
+
+    if length(spots) == followers, do: spots
   end
 
   defp told(formation, spots), do: {formation, FreeSlots.whole(length(spots)), spots}
