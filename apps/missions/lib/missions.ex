@@ -8,6 +8,7 @@ defmodule Missions do
   | `landmark` | `Missions.Landmark` | finds a landmark, elects who sees it best, and follows it in formation |
   | `patrol` | `Missions.Patrol` | visits points for ever, and takes over those of a robot that has died |
   | `flock` | `Missions.Flock` | keeps together on its way along a course, without a leader |
+  | `explore` | `Missions.Explore` | sees all of a building that nobody knows, and makes its map |
   | `teleop` | `Missions.Teleop` | is driven by a person |
 
   A mission is fed events, and returns its phase and what is to be done:

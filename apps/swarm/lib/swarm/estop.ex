@@ -1,13 +1,13 @@
 defmodule Swarm.EStop do
   @moduledoc """
   Stops a robot in an emergency: a companion beside its comms process, with high priority and a mailbox of its own.
-  Everything that stops the robot arrives here (`:estop`, `:reset`, `:stop` and `:disarm` from people, calls of
+  Every stop of people and of other nodes arrives here (`:estop`, `:reset`, `:stop` and `:disarm`, calls of
   `Swarm.EStop.Broadcaster`) and goes to the gate at once, even if the comms process is flooded, hangs or is dead.
 
   It alone owns the state of the emergency stop (`Swarm.EStop.State`), and publishes it on the
   board under `:estop`, for all others to read. The only other copy is the gate's latch, which
-  this process sets. A button on the gate itself sets and clears it, too; the gate reports that
-  (`latch/1`), and this process follows.
+  this process sets. Who calls the gate itself (`Robot.Safety.Gate.estop/1`: its button, as `mix calibrate` does) sets
+  and clears it, too; the gate reports that (`latch/1`), and this process follows.
 
   Nobody else decides, and nobody waits for this process: the comms process passes on what a
   heartbeat says if that differs from the board (`heard/3`), and is told of each change, so that

@@ -10,7 +10,7 @@ defmodule Robot.Localiser.Consistency do
   `Robot.Localiser.Belief.weigh/2` counts such pictures.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Columns, Glance}
+  alias Robot.Localiser.{Anchors, Belief, Columns, Glance, InSight}
   alias Robot.Percept
   alias Robot.Percept.Sighting
 
@@ -41,7 +41,8 @@ defmodule Robot.Localiser.Consistency do
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
     view = Sighting.field_of_view(percept)
     glance = Glance.new(belief, exposed, percept.detections.pan, view)
-    look = {belief, exposed, Columns.camera(percept), glance}
+    in_sight = InSight.new(percept.grid, belief, exposed)
+    look = {belief, exposed, Columns.camera(percept), glance, in_sight}
 
     cond do
       contradicted?(robots, look, covered, seen) -> :contradicted
@@ -54,7 +55,7 @@ defmodule Robot.Localiser.Consistency do
   # are too few already.
   defp contradicted?([], _look, _covered, strangers), do: Columns.count(strangers) >= @columns
 
-  defp contradicted?([mark | robots], {_, exposed, _, _} = look, covered, strangers) do
+  defp contradicted?([mark | robots], {_, exposed, _, _, _} = look, covered, strangers) do
     distance = Pose.distance(exposed, mark.at)
 
     if distance >= @in_sight and Columns.count(strangers) < @columns do
@@ -68,12 +69,12 @@ defmodule Robot.Localiser.Consistency do
   end
 
   # The columns that a robot may fill, and those that it must fill.
-  defp spans(mark, distance, {belief, exposed, camera, glance}) do
+  defp spans(mark, distance, {belief, exposed, camera, glance, in_sight}) do
     near = if distance > mark.radius, do: distance, else: mark.radius
     half = :math.asin(mark.radius / near)
     most = half + @sds * Glance.most_sd(glance, mark, distance) + @border_sd
 
-    if Glance.aside(glance, mark.at) > most do
+    if Glance.aside(glance, mark.at) > most or not InSight.seen?(in_sight, mark) do
       {0, 0}
     else
       bearing = Pose.bearing(exposed, mark.at)

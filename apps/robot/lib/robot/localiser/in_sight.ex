@@ -1,7 +1,7 @@
 defmodule Robot.Localiser.InSight do
   @moduledoc """
-  Leaves out the robots that walls hide, by the floor plan: a picture shows nothing of them, and none of its blobs can be one.
-  Pure.
+  Decides whether walls hide a robot, by the floor plan: then a picture shows nothing of it, and none of its blobs can be it.
+  Pure. It costs several lines over the grid for each robot, so it is asked last.
 
   A robot counts as hidden if no line from where this robot may be, the estimate and one standard deviation to both sides of it
   along the direction of its greatest uncertainty, leads to its middle or to either side of it.
@@ -15,25 +15,34 @@ defmodule Robot.Localiser.InSight do
   # An uncertainty up to this (metres) counts as none.
   @sure 0.1
 
-  @doc "The marks that may be in sight from a pose of this belief; all of them without a plan."
-  @spec marks([Anchors.mark()], Grid.t() | nil, Belief.t(), Pose.t()) :: [Anchors.mark()]
-  def marks(marks, nil, _belief, _pose), do: marks
+  @enforce_keys [:grid, :places]
+  defstruct @enforce_keys
 
-  def marks(marks, grid, belief, %Pose{} = pose) do
-    places = places(belief, pose)
-    Enum.filter(marks, fn mark -> Enum.any?(places, &seen?(grid, &1, mark)) end)
+  @typedoc "The plan, `nil` for none, and the places where this robot may be (metres)."
+  @type t :: %__MODULE__{grid: Grid.t() | nil, places: [Pose.point()]}
+
+  @doc "What is asked of the plan from a pose of this belief."
+  @spec new(Grid.t() | nil, Belief.t(), Pose.t()) :: t()
+  def new(nil, _belief, _pose), do: %__MODULE__{grid: nil, places: []}
+
+  def new(grid, belief, %Pose{x: x, y: y}) do
+    {worst, _least, direction} = Belief.spread(belief)
+    {dx, dy} = {worst * :math.cos(direction), worst * :math.sin(direction)}
+    sides = if worst > @sure, do: [{x + dx, y + dy}, {x - dx, y - dy}], else: []
+    %__MODULE__{grid: grid, places: [{x, y} | sides]}
   end
+
+  @doc "Whether a mark may be in sight; always without a plan."
+  @spec seen?(t(), Anchors.mark()) :: boolean()
+  def seen?(%__MODULE__{grid: nil}, _mark), do: true
+
+  def seen?(%__MODULE__{grid: grid, places: places}, mark),
+    do: Enum.any?(places, &seen?(grid, &1, mark))
 
   @doc "The marks that are in sight from a place (metres), by the plan."
   @spec from([Anchors.mark()], Grid.t() | nil, Pose.point()) :: [Anchors.mark()]
   def from(marks, nil, _place), do: marks
   def from(marks, grid, place), do: Enum.filter(marks, &seen?(grid, place, &1))
-
-  defp places(belief, %Pose{x: x, y: y}) do
-    {worst, _least, direction} = Belief.spread(belief)
-    {dx, dy} = {worst * :math.cos(direction), worst * :math.sin(direction)}
-    if worst > @sure, do: [{x, y}, {x + dx, y + dy}, {x - dx, y - dy}], else: [{x, y}]
-  end
 
   defp seen?(grid, {px, py} = place, %{at: {x, y} = at, radius: radius}) do
     share = radius / max(Pose.distance(place, at), radius)

@@ -8,7 +8,7 @@ defmodule Robot.Localiser.Matching do
   direction is less certain (`slack`).
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Anchors, Belief, Glance}
+  alias Robot.Localiser.{Anchors, Belief, Glance, InSight}
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
@@ -43,11 +43,18 @@ defmodule Robot.Localiser.Matching do
 
   @doc """
   The reference robots among the marks that match a blob without a rival, each with its blob, in
-  the order of the marks.
+  the order of the marks. None is a robot that walls hide (`in_sight`).
   """
-  @spec pairs([Anchors.mark()], [Blob.t()], Belief.t(), Pose.t(), pan :: float(), view :: float()) ::
-          [pair()]
-  def pairs(robots, blobs, belief, exposed, pan, view) do
+  @spec pairs(
+          [Anchors.mark()],
+          [Blob.t()],
+          Belief.t(),
+          Pose.t(),
+          pan :: float(),
+          view :: float(),
+          InSight.t()
+        ) :: [pair()]
+  def pairs(robots, blobs, belief, exposed, pan, view, in_sight) do
     looks =
       for(blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)})
       |> Enum.group_by(&elem(&1, 0))
@@ -62,6 +69,7 @@ defmodule Robot.Localiser.Matching do
           [{_colour, %{width: picture}, _seen} | _] = alike <- [Map.get(looks, mark.colour)],
           expected = expected(mark, belief, exposed, {picture, view}),
           beside = beside(expected, alike),
+          beside != [] and InSight.seen?(in_sight, mark),
           c <- candidates(expected, beside, belief, exposed),
           do: c
 

@@ -37,11 +37,11 @@ defmodule Robot.Localiser.Sightings do
     {landmarks, robots} = Enum.split_with(marks, &(&1.kind == :landmark))
     picture = {percept, back}
 
-    belief =
-      belief |> see_landmarks(landmarks, picture) |> Silhouettes.align(robots, percept, back)
-
-    robots = InSight.marks(robots, percept.grid, belief, exposed(belief, back))
-    belief |> see_robots(robots, picture) |> weigh(robots, picture)
+    belief
+    |> see_landmarks(landmarks, picture)
+    |> Silhouettes.align(robots, percept, back)
+    |> see_robots(robots, picture)
+    |> weigh(robots, picture)
   end
 
   defp weigh(belief, robots, {percept, back}),
@@ -65,15 +65,12 @@ defmodule Robot.Localiser.Sightings do
 
   defp see_robots(belief, robots, {percept, back} = picture) do
     view = Sighting.field_of_view(percept)
+    exposed = exposed(belief, back)
+    pan = percept.detections.pan
+    in_sight = InSight.new(percept.grid, belief, exposed)
 
     robots
-    |> Matching.pairs(
-      percept.detections.blobs,
-      belief,
-      exposed(belief, back),
-      percept.detections.pan,
-      view
-    )
+    |> Matching.pairs(percept.detections.blobs, belief, exposed, pan, view, in_sight)
     |> Enum.reduce(belief, fn %{mark: mark, blob: blob, slack: slack} = pair, belief ->
       distance = if pair.whole?, do: Sighting.distance_by_width(blob, mark.radius, view)
       see(belief, picture, mark, blob, slack, distance)

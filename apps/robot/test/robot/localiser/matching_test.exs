@@ -1,7 +1,7 @@
 defmodule Robot.Localiser.MatchingTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Frame, Matching}
+  alias Robot.Localiser.{Belief, Frame, InSight, Matching}
   alias Robot.Percept.Sighting
   alias Vision.Blob
 
@@ -47,8 +47,35 @@ defmodule Robot.Localiser.MatchingTest do
 
   defp pairs(robots, blobs, belief \\ Belief.new(@here)) do
     for %{mark: mark, blob: blob, whole?: whole?} <-
-          Matching.pairs(robots, blobs, belief, @here, 0.0, @view),
+          matched(robots, blobs, belief),
         do: {mark.key, Enum.find_index(blobs, &(&1 == blob)), whole?}
+  end
+
+  # Without a plan, or by one.
+  defp matched(robots, blobs, belief, plan \\ nil) do
+    in_sight = InSight.new(plan, belief, @here)
+    Matching.pairs(robots, blobs, belief, @here, 0.0, @view, in_sight)
+  end
+
+  test "a robot behind a wall of the plan is no blob, and no rival of another one" do
+    # A wall at x = 2.5, from y = -2 to 0.4.
+    cells =
+      for j <- 0..79,
+          i <- 0..79,
+          into: <<>>,
+          do: if(i == 65 and j in 20..43, do: <<1>>, else: <<0>>)
+
+    plan = Robot.Navigation.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
+    hidden = robot(:mag2, {3.2, 0.0}, reference?: true)
+    near = robot(:mag3, {3.0, 0.1}, reference?: true)
+    blob = blob({3.0, 0.1})
+    assert pairs([hidden, near], [blob]) == []
+    assert [%{mark: %{key: :mag2}}] = matched([hidden], [blob], Belief.new(@here))
+    assert matched([hidden], [blob], Belief.new(@here), plan) == []
+
+    seen = robot(:mag3, {2.2, 0.1})
+    belief = Belief.new(@here)
+    assert [%{mark: %{key: :mag3}}] = matched([hidden, seen], [blob({2.2, 0.1})], belief, plan)
   end
 
   test "each robot is the blob where it is expected and as wide as it is" do
@@ -90,13 +117,13 @@ defmodule Robot.Localiser.MatchingTest do
   test "what is half hidden, or several in one, tells a direction less surely, and no distance" do
     robots = [robot(:mag2, {1.0, 0.0})]
     whole = blob({1.0, 0.0})
-    [%{slack: slack}] = Matching.pairs(robots, [whole], Belief.new(@here), @here, 0.0, @view)
+    [%{slack: slack}] = matched(robots, [whole], Belief.new(@here))
     assert slack < 0.01
 
     for share <- [0.75, 1.3] do
       part = blob({1.0, 0.0}, 0.2, share)
       assert pairs(robots, [part]) == [{:mag2, 0, false}]
-      [%{slack: slack}] = Matching.pairs(robots, [part], Belief.new(@here), @here, 0.0, @view)
+      [%{slack: slack}] = matched(robots, [part], Belief.new(@here))
       assert_in_delta slack, abs(share - 1) * :math.asin(0.2), 0.01
     end
 
