@@ -47,6 +47,8 @@ defmodule Robot.Board do
     7. `%{mission: {module, options} or nil, changing?: while it is being replaced, says: line for
        people}` (`Swarm.Replacement`)
 
+  After its end nothing is found on it, and what is written to it has no effect.
+
   This process owns the tables, so that they survive a crash of their writers, and writes what must
   survive more: the **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is
   slow, or hangs, delays neither the gate's steps nor the executive's ticks. All the rest is lost
@@ -63,6 +65,7 @@ defmodule Robot.Board do
   alias Vision.Detections
 
   @again_ms 1_000
+  @peers [{{{:peer, :"$1"}, :"$2", :_}, [], [{{:"$1", :"$2"}}]}]
 
   @enforce_keys [:robot, :table, :latch, :clock, :since_ms]
   defstruct @enforce_keys
@@ -149,7 +152,7 @@ defmodule Robot.Board do
     unless writer(key) == writer,
       do: raise(ArgumentError, "board key #{inspect(key)} is not written by #{inspect(writer)}")
 
-    :ets.insert(table, {key, value, at_ms})
+    _inserted? = unless_ended(true, fn -> :ets.insert(table, {key, value, at_ms}) end)
     :ok
   end
 
@@ -175,7 +178,7 @@ defmodule Robot.Board do
   @spec delete(t(), writer(), key :: term()) :: :ok
   def delete(%__MODULE__{table: table}, writer, key) do
     ^writer = writer(key)
-    :ets.delete(table, key)
+    _deleted? = unless_ended(true, fn -> :ets.delete(table, key) end)
     :ok
   end
 
@@ -189,7 +192,7 @@ defmodule Robot.Board do
           {:ok, term(), at_ms :: integer()} | :error
   def fetch(%__MODULE__{table: table}, key, max_age_ms, now_ms) do
     # Numbers are smaller than atoms, so that nothing is older than `:infinity`.
-    case :ets.lookup(table, key) do
+    case unless_ended([], fn -> :ets.lookup(table, key) end) do
       [{_key, value, at_ms}] when now_ms - at_ms <= max_age_ms -> {:ok, value, at_ms}
       _none_or_old -> :error
     end
@@ -212,18 +215,20 @@ defmodule Robot.Board do
   @doc "The peers on the board, by their ids."
   @spec peers(t()) :: %{atom() => Robot.Percept.peer()}
   def peers(%__MODULE__{table: table}),
-    do: Map.new(:ets.select(table, [{{{:peer, :"$1"}, :"$2", :_}, [], [{{:"$1", :"$2"}}]}]))
+    do: Map.new(unless_ended([], fn -> :ets.select(table, @peers) end))
 
   @doc "All entries with their ages, for people."
   @spec entries(t()) :: %{(key :: term()) => {value :: term(), age_ms :: integer()}}
   def entries(%__MODULE__{table: table} = board) do
     now_ms = now(board)
-    Map.new(:ets.tab2list(table), fn {key, value, at_ms} -> {key, {value, now_ms - at_ms}} end)
+    all = unless_ended([], fn -> :ets.tab2list(table) end)
+    Map.new(all, fn {key, value, at_ms} -> {key, {value, now_ms - at_ms}} end)
   end
 
-  @doc "Whether the e-stop is latched."
+  @doc "Whether the e-stop is latched; a robot whose board has ended is held."
   @spec latched?(t()) :: boolean()
-  def latched?(%__MODULE__{latch: latch}), do: :ets.member(latch, :estop)
+  def latched?(%__MODULE__{latch: latch}),
+    do: unless_ended(true, fn -> :ets.member(latch, :estop) end)
 
   @doc "Latches the e-stop. This process writes the file, and reports one that cannot be written."
   @spec latch(t()) :: :ok
@@ -325,6 +330,13 @@ defmodule Robot.Board do
       nil -> s
       {:ok, files} -> {board, files}
     end
+  end
+
+  # The tables go with the board, and who is not below it in the robot's tree may have found it a moment before.
+  defp unless_ended(otherwise, of_table) do
+    of_table.()
+  rescue
+    ArgumentError -> otherwise
   end
 
   defp writer({:peer, _id}), do: :comms

@@ -49,6 +49,20 @@ defmodule Robot.BoardTest do
   end
 
   @tag :capture_log
+  test "one that has ended is empty, and holds its robot, for whoever found it a moment before" do
+    board = board(:board_ended)
+    Board.put(board, :drive, :sonar, [1.0], 1_000)
+    refute Board.latched?(board)
+    stop_supervised!(:board_ended)
+
+    assert Board.fetch(board, :sonar, :infinity) == :error
+    assert {Board.entries(board), Board.peers(board)} == {%{}, %{}}
+    assert Board.latched?(board)
+    assert Board.put(board, :drive, :sonar, [2.0], 1_100) == :ok
+    assert Board.delete(board, :comms, {:peer, :mag2}) == :ok
+    assert_raise ArgumentError, fn -> Board.put(board, :executive, :sonar, [], 0) end
+  end
+
   test "two robots of one name cannot be" do
     board(:board4)
     # It is linked before it finds that it is the second.
