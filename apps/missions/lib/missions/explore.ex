@@ -4,7 +4,7 @@ defmodule Missions.Explore do
   interface of `Robot.Mission` alone.
 
   Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
-  they estimate. Once a second it looks for the frontiers of what is known (`.Frontiers`), chooses one (`.Choice`), and tells
+  they estimate. Once a second it looks for the frontiers of what is known (`Robot.Navigation.Frontiers`), chooses one (`.Choice`), and tells
   the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
 
@@ -12,7 +12,9 @@ defmodule Missions.Explore do
   which it came no nearer is left alone for a while, and for ever the second time. Options: `Missions.Explore.Options`.
   """
   alias Hal.Pose
-  alias Missions.Explore.{Choice, Frontiers, Options, SharedMap}
+  alias Missions.Explore.{Options, SharedMap}
+  alias Robot.Navigation.Frontiers
+  alias Robot.Navigation.Frontiers.Choice
 
   @behaviour Robot.Mission
 

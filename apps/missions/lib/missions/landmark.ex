@@ -8,6 +8,7 @@ defmodule Missions.Landmark do
   | part | decides |
   |---|---|
   | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
+  | `Lookout`, `Coverage` | where it looks next, and what has been looked at |
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
   | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed |
   | `Shape` | a shape that there is room for |
@@ -28,7 +29,7 @@ defmodule Missions.Landmark do
   alias Swarm.Comms.Forwarder
   alias Swarm.Formation.Trail
   alias Missions.Landmark
-  alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Policy}
+  alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Lookout, Policy}
   alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Transitions}
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
@@ -64,7 +65,7 @@ defmodule Missions.Landmark do
   defdelegate option_table, to: Landmark.Options, as: :table
 
   @impl Robot.Mission
-  def messages, do: {1, round: :shared, claim: :shared}
+  def messages, do: {1, round: :shared, claim: :shared, looked: Lookout.message()}
 
   @impl Robot.Mission
   def claims, do: {2, Landmark.Claim}
@@ -98,9 +99,15 @@ defmodule Missions.Landmark do
   def handle({:command, _other}, mission), do: still(mission)
 
   def handle({:outcome, {:search, _since}, result}, %{phase: :search} = mission),
-    do: still(%{mission | scan: if(result == 1, do: :found, else: :nothing)})
+    do: still(searched(mission, result))
+
+  def handle({:outcome, {:roam, leg}, result}, %{phase: :wander} = mission),
+    do: still(Lookout.ended(mission, leg, result))
 
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
+
+  def handle({:message, %{kind: :looked, from: from, body: body}}, mission) when is_list(body),
+    do: still(Lookout.hear(mission, from, body))
 
   # The receiver has checked it, but on its way to here anybody on this node may have put another.
   def handle({:message, message}, %{round: %{view: view}} = mission),
@@ -125,7 +132,7 @@ defmodule Missions.Landmark do
 
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)
-    {mission, effects} = act(Transitions.activity(mission.phase), mission)
+    {mission, effects} = mission.phase |> Transitions.activity() |> act(mission)
 
     effects =
       if :lists.keymember(:anchors, 1, effects),
@@ -141,6 +148,12 @@ defmodule Missions.Landmark do
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until
   # it leads for the first time, nobody has taken its places from it.
+  #
+  # On a long search the walls of its plan correct it.
+  defp unled(%{lookout: lookout, phase: phase})
+       when lookout != nil and phase in [:search, :agree, :wander, :rest],
+       do: %Anchors{}
+
   defp unled(%{phase: phase, leadership: %{sequence: 0}, colour: colour})
        when phase in [:search, :agree],
        do: %Anchors{standing: colour, walls?: false}
@@ -186,6 +199,13 @@ defmodule Missions.Landmark do
     {%{mission | forwarder: forwarder}, letters}
   end
 
+  defp searched(mission, 1), do: %{mission | scan: :found}
+
+  defp searched(mission, _nothing) do
+    mission = %{mission | scan: :nothing}
+    if Lookout.alone?(mission), do: Lookout.turned(mission), else: mission
+  end
+
   defp still(mission), do: {mission.phase, mission, []}
 
   # Goes from phase to phase along the table; if the next phase ends at once, it goes on at once.
@@ -203,6 +223,8 @@ defmodule Missions.Landmark do
 
   defp stage(_phase, _mission), do: []
 
+  defp act(:stand, %{phase: :rest, lookout: %{told?: false}} = mission), do: Lookout.act(mission)
+
   defp act(:stand, mission),
     do: {mission, [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, 0.0}]}
 
@@ -212,6 +234,8 @@ defmodule Missions.Landmark do
     {mission,
      [{:goal, {:search, mission.since_ms}, {Robot.Behaviour.FindBlob, options}}, {:look, 0.0}]}
   end
+
+  defp act(:roam, %{lookout: %{}} = mission), do: Lookout.act(mission)
 
   defp act(:roam, mission),
     do: {mission, [{:goal, :roam, {Robot.Behaviour.Wander, []}}, {:look, 0.0}]}

@@ -2,7 +2,9 @@ defmodule Missions.ExploreTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Options, Pose, Profile, Twist}
   alias Missions.Explore
-  alias Missions.Explore.{Choice, Frontiers, SharedMap}
+  alias Missions.Explore.SharedMap
+  alias Robot.Navigation.Frontiers
+  alias Robot.Navigation.Frontiers.Choice
   alias Robot.Mission.{Letter, Runner}
   alias Robot.Navigation.Survey
   alias Robot.Percept

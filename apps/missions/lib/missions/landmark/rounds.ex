@@ -12,7 +12,7 @@ defmodule Missions.Landmark.Rounds do
   alias Swarm.Agreement.{Election, Round}
   alias Swarm.Formation.{Assignment, Chain}
   alias Missions.Landmark
-  alias Missions.Landmark.{EpochFilter, Merge, Policy}
+  alias Missions.Landmark.{EpochFilter, Lookout, Merge, Policy}
   alias Missions.Landmark.Rounds.{Challenge, Opening, Report, View}
 
   @doc "Hears a letter. A robot that is not started does not take part."
@@ -117,7 +117,7 @@ defmodule Missions.Landmark.Rounds do
         mission
 
       :nobody when mission.round.purpose == :search ->
-        %{mission | verdict: :nobody, rescan?: false}
+        Lookout.turned(%{mission | verdict: :nobody, rescan?: false})
 
       :nobody ->
         %{mission | scan: nil, rescan?: true}

@@ -3,7 +3,7 @@ defmodule Missions.Landmark.SelfReport do
   Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   """
   alias Missions.Landmark
-  alias Missions.Landmark.{Blocker, Marks}
+  alias Missions.Landmark.{Blocker, Lookout, Marks}
 
   @doc "The claim of this tick."
   @spec claim(Landmark.State.t()) :: map()
@@ -40,6 +40,7 @@ defmodule Missions.Landmark.SelfReport do
     "in its slot, but NOT SURE of its place#{within}"
   end
 
+  defp says(%{phase: phase} = mission) when phase in [:wander, :rest], do: Lookout.says(mission)
   defp says(_mission), do: nil
 
   defp within(metres), do: " (±#{:erlang.float_to_binary(metres * 1.0, decimals: 2)} m)"

@@ -4,6 +4,7 @@ defmodule Missions.Landmark.State do
   The parts' own states are under `leadership`, `follower`, `round`, `sight`.
   """
   alias Hal.{Pose, Twist}
+  alias Missions.Landmark
   alias Missions.Landmark.{Company, EpochFilter, LandmarkTrack}
 
   @colour "YellowLandmark"
@@ -26,6 +27,7 @@ defmodule Missions.Landmark.State do
                 round: nil,
                 verdict: nil,
                 rescan?: false,
+                lookout: nil,
                 order: [],
                 epoch: 0,
                 leader: nil,
@@ -85,6 +87,7 @@ defmodule Missions.Landmark.State do
           round: Swarm.Agreement.Round.t() | nil,
           verdict: {:leader, atom()} | :nobody | nil,
           rescan?: boolean(),
+          lookout: Landmark.Lookout.t() | nil,
           order: [atom()],
           epoch: non_neg_integer(),
           leader: atom() | nil,

@@ -9,7 +9,7 @@ defmodule Missions.Landmark.Transitions do
   | `:idle` | stands | until it is started |
   | `:search` | turns around once, looking for the landmark, and listens | the thesis's parallel state |
   | `:agree` | stands, having reported, until the round commits | report and collect |
-  | `:wander` | roams a little | after a round in which nobody had found it |
+  | `:wander` | goes to the next place to look around (`Lookout`), or roams a little | after a turn in vain |
   | `:rest` | stands | the landmark is nowhere; starts again when it sees one |
   | `:lead` | tracks the landmark, tells the others where the robot is | |
   | `:follow` | drives to its slot, passes the reference on to its child | |
@@ -21,11 +21,12 @@ defmodule Missions.Landmark.Transitions do
   |---|---|
   | `:started` | a person has started it |
   | `:elected`, `:led` | a round has made this robot the leader, or another one, or a leader names it in its order |
-  | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; the third in a row |
+  | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; with nothing left to look at, or the third in a row of robots that know no walls |
+  | `:more`, `:no_more` | it searches from room to room, turned in vain, and something is left to look at; nothing is |
   | `:scanned` | the turn is over, whatever it showed |
   | `:scan_wanted` | a round waits for a scan that this robot has not made |
   | `:sighted` | the landmark is in the picture, or a round waits for a scan |
-  | `:roamed` | it has roamed for long enough |
+  | `:roamed` | it is at the next place to look around, or has roamed for long enough |
   | `:deposed` | others follow a later leader, or nobody hears this one |
   | `:superseded` | a leader of a later epoch names this robot in its order |
   | `:round_open` | a round is under way |
@@ -45,6 +46,8 @@ defmodule Missions.Landmark.Transitions do
        lost_stop: :halt,
        lost_hold: :hold,
        short: :wait,
+       more: :wander,
+       no_more: :rest,
        scanned: :agree},
     agree:
       {:stand,
@@ -63,6 +66,7 @@ defmodule Missions.Landmark.Transitions do
        lost_hold: :hold,
        short: :wait,
        sighted: :search,
+       no_more: :rest,
        roamed: :search},
     rest:
       {:stand, led: :follow, lost_stop: :halt, lost_hold: :hold, short: :wait, sighted: :search},
@@ -93,6 +97,8 @@ defmodule Missions.Landmark.Transitions do
           | :led
           | :nobody
           | :nobody_again
+          | :more
+          | :no_more
           | :scanned
           | :scan_wanted
           | :sighted

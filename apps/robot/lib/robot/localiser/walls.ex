@@ -30,7 +30,7 @@ defmodule Robot.Localiser.Walls do
   @sd 0.15
   @exact 0.04
   # A pose that is less sure than this (metres, radians) is not corrected: it would expect other walls than those that it hears.
-  @vague {1.0, 0.4}
+  @vague {1.0, 0.8}
   @gate 9.0
 
   defstruct at: nil, dead: nil, trust: %Trust{}

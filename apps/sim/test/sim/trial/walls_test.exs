@@ -54,6 +54,26 @@ defmodule Sim.Trial.WallsTest do
     formed(map, 3, :sonar)
   end
 
+  describe "a landmark where nobody sees it" do
+    @describetag long: true
+
+    test "is looked for from room to room" do
+      moves = [{1, {:move, {8.0, 6.0}}}]
+      options = %{map: "rooms:3", robots: @robots, landmark: :none, script: moves}
+      trial = run(Map.merge(options, %{seed: 1, plan: :known, duration_s: 180}))
+      assert Trial.formed?(trial)
+      assert Trial.result(trial).collisions == 0
+    end
+
+    test "is said not to be there once all has been looked at" do
+      options = %{map: "rooms:3", robots: @robots, landmark: :none, seed: 1, plan: :known}
+      trial = run(Map.put(options, :duration_s, 240))
+      assert %{collisions: 0, leader: nil, fleet: fleet} = Trial.result(trial)
+      assert Enum.uniq(for robot <- fleet, do: robot.state) == [:rest]
+      for robot <- fleet, do: assert(robot.says =~ ~r/no landmark: .* 2[23]\d m²/)
+    end
+  end
+
   test "four rooms with doors of 1.2 m", %{tmp_dir: folder} do
     walls = [
       {-0.1, -6, 0.1, -3.2},

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Rounds.Opening do
   @moduledoc "Decides when a robot opens a round of the landmark mission, and when it leaves one. Pure."
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, Merge, Policy}
+  alias Missions.Landmark.{Claim, Lookout, Merge, Policy}
   alias Missions.Landmark.Rounds.View
   alias Swarm.Agreement.Round
   alias Swarm.Membership.NameSet
@@ -40,7 +40,7 @@ defmodule Missions.Landmark.Rounds.Opening do
       mission.verdict != nil or View.leading_epoch(mission) >= 0 ->
         mission
 
-      mission.phase == :search and turn?(mission, view, since) ->
+      mission.phase == :search and not Lookout.alone?(mission) and turn?(mission, view, since) ->
         start(mission, view, :search)
 
       mission.phase == :agree and turn?(mission, view, since) ->

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Transitions.Conditions do
   @moduledoc "Decides which conditions of `Missions.Landmark.Transitions` hold for a robot now. Pure."
   alias Missions.Landmark
-  alias Missions.Landmark.{Leader, Policy, ReferenceInbox, Rounds, Transitions}
+  alias Missions.Landmark.{Leader, Lookout, Policy, ReferenceInbox, Rounds, Transitions}
   alias Swarm.Agreement.Round
 
   @roam_ms 6_000
@@ -18,11 +18,22 @@ defmodule Missions.Landmark.Transitions.Conditions do
     do: match?({:leader, other} when other != m.me, m.verdict) or ReferenceInbox.joined?(m)
 
   def holds?(:nobody, m), do: m.verdict == :nobody
-  def holds?(:nobody_again, m), do: m.verdict == :nobody and m.tries + 1 >= @tries
+
+  def holds?(:nobody_again, m) do
+    over? = if Lookout.alone?(m), do: not Lookout.left?(m), else: m.tries + 1 >= @tries
+    m.verdict == :nobody and over?
+  end
+
+  def holds?(:more, m), do: turned?(m) and Lookout.left?(m)
+  def holds?(:no_more, m), do: turned?(m) and not Lookout.left?(m)
   def holds?(:scanned, m), do: m.scan != nil
   def holds?(:scan_wanted, m), do: m.scan == nil and Rounds.search?(m)
   def holds?(:sighted, m), do: Landmark.State.sees?(m) or Rounds.search?(m)
-  def holds?(:roamed, m), do: m.now_ms - m.since_ms >= @roam_ms
+
+  def holds?(:roamed, m) do
+    if Lookout.left?(m), do: Lookout.arrived?(m), else: m.now_ms - m.since_ms >= @roam_ms
+  end
+
   def holds?(:deposed, m), do: Leader.deposed?(m)
 
   def holds?(:superseded, m),
@@ -42,6 +53,12 @@ defmodule Missions.Landmark.Transitions.Conditions do
 
   def holds?(:short, m), do: not Round.open?(m.round) and Policy.short?(m, together(m))
   def holds?(:enough, m), do: Policy.enough?(m, together(m))
+
+  # A robot on its way has turned before, and may learn that others have looked at the rest.
+  defp turned?(m),
+    do:
+      Lookout.alone?(m) and not Round.open?(m.round) and
+        (m.scan == :nothing or m.phase == :wander)
 
   defp together(m), do: length(Rounds.view(m))
 end

@@ -24,6 +24,7 @@ defmodule Missions.Landmark.Transitions.Entry do
           | phase: :idle,
             scan: nil,
             tries: 0,
+            lookout: nil,
             verdict: nil,
             leader: nil,
             anchor: nil,
@@ -55,10 +56,17 @@ defmodule Missions.Landmark.Transitions.Entry do
         }
 
       :lead ->
-        Leader.begin(%{mission | phase: :lead, verdict: nil, tries: 0, leader: mission.me})
+        Leader.begin(%{
+          mission
+          | phase: :lead,
+            verdict: nil,
+            tries: 0,
+            lookout: nil,
+            leader: mission.me
+        })
 
       :follow ->
-        follow(%{mission | phase: :follow, tries: 0})
+        follow(%{mission | phase: :follow, tries: 0, lookout: nil})
     end
   end
 

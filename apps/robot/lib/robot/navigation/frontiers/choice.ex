@@ -1,4 +1,4 @@
-defmodule Missions.Explore.Choice do
+defmodule Robot.Navigation.Frontiers.Choice do
   @moduledoc """
   Decides which frontier a robot goes to: the one with the least cost, where what others are going to see costs extra (Burgard, Moors,
   Stachniss and Schneider 2005, section III). Pure.
@@ -8,7 +8,7 @@ defmodule Missions.Explore.Choice do
   decide the same about it.
   """
   alias Hal.Pose
-  alias Missions.Explore.Frontiers
+  alias Robot.Navigation.Frontiers
 
   # Who goes to a place will see what is within so many metres of it; going there, too, is like a way longer by so many.
   @sees 5.0
@@ -25,7 +25,7 @@ defmodule Missions.Explore.Choice do
 
       iex> [near, far] = for x <- [2.0, 9.0], do: %{at: {x, 0.0}, far: x, size: 5, square: round(x)}
       iex> for goals <- [[], [{:mag2, {2.5, 0.0}, 1.0}], [{:mag2, {2.5, 0.0}, 3.0}]],
-      ...>     do: Missions.Explore.Choice.of([near, far], :mag1, nil, goals).at
+      ...>     do: Robot.Navigation.Frontiers.Choice.of([near, far], :mag1, nil, goals).at
       [{2.0, 0.0}, {9.0, 0.0}, {2.0, 0.0}]
   """
   @spec of([Frontiers.frontier()], atom(), Pose.point() | nil, [goal()]) ::

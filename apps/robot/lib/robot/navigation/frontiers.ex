@@ -1,4 +1,4 @@
-defmodule Missions.Explore.Frontiers do
+defmodule Robot.Navigation.Frontiers do
   @moduledoc """
   Finds frontiers: where what is known to be free meets what is unknown, and how far it is there (Yamauchi 1997). Pure;
   metres, in the frame of the map.
