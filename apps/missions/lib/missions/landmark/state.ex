@@ -87,7 +87,7 @@ defmodule Missions.Landmark.State do
           round: Swarm.Agreement.Round.t() | nil,
           verdict: {:leader, atom()} | :nobody | nil,
           rescan?: boolean(),
-          lookout: Landmark.Lookout.t() | nil,
+          lookout: Landmark.Lookout.Legs.t() | nil,
           order: [atom()],
           epoch: non_neg_integer(),
           leader: atom() | nil,
