@@ -5,7 +5,7 @@ defmodule Hal.Device.Arming do
   | state | the wheels | until |
   |---|---|---|
   | `:disarmed` | receive only stops | a person arms, or, with `:auto`, the drive is ready |
-  | `:armed` | may turn | a person disarms, the drive is no longer ready, or the line is lost |
+  | `:armed` | may turn | a person disarms, the drive is no longer ready, the line is lost, or, with `:manual`, they stand for 3 s although they were told to turn |
   | `{:error, reason}` | receive only stops | a person acknowledges that the line was lost while they turned |
 
   With the policy `:manual` (real robots) only a person arms: after each start, each loss of the
@@ -85,6 +85,17 @@ defmodule Hal.Device.Arming do
     do: %{arming | state: :disarmed, why: line}
 
   def ready(%__MODULE__{} = arming, _readiness), do: arming
+
+  @doc """
+  Records that the wheels stand although they were told to turn, as with the power of the motors cut by an emergency button
+  (`Hal.Device.Obedience`).
+
+      iex> for policy <- [:auto, :manual], do: Hal.Device.Arming.stood(%Hal.Device.Arming{policy: policy, state: :armed}).state
+      [:armed, :disarmed]
+  """
+  @spec stood(t()) :: t()
+  def stood(%__MODULE__{policy: :manual} = arming), do: disarmed(arming)
+  def stood(%__MODULE__{} = arming), do: arming
 
   @doc """
   Carries out a person's order, and gives the answer to it. `readiness` is that of the drive now.

@@ -109,7 +109,7 @@ defmodule Hal.Device.Lifecycle do
 
   defp judged(%{inner: {:open, inner}} = s) do
     case {Liveness.judge(s.signs, State.now(s)), s.kind} do
-      {:online, _kind} -> s |> Publisher.health(obeys(s)) |> ready()
+      {:online, _kind} -> s |> Publisher.health(obeys(s)) |> stood() |> ready()
       {:waiting, _kind} -> ready(s)
       {{:offline, :silent}, :drive} -> s |> ready() |> silent()
       {{:offline, reason}, _kind} -> fail(s, reason, inner)
@@ -122,6 +122,12 @@ defmodule Hal.Device.Lifecycle do
       {:error, fault} -> {:offline, fault}
     end
   end
+
+  # Whoever releases the emergency button of a base must not set it going.
+  defp stood(%{kind: :drive, obedience: %{late?: true}} = s),
+    do: become(s, Arming.stood(s.arming))
+
+  defp stood(s), do: s
 
   # The stop may have failed, and closed the driver.
   defp silent(%{inner: {:open, _}} = s), do: Publisher.health(s, {:offline, :silent})

@@ -8,7 +8,7 @@ defmodule Hal.Device.Obedience do
   | a driver reports `{:refused, request, line}` | it is counted, and told when it is the first in a row, and every 10 s |
   | 3 such in a row of one request, over 2 s at least | offline, until `{:obeyed, request}` or, for `:look` and `:drive`, until the device moves |
   | a head stands still more than 5 degrees from where it is told to look, for 5 s | offline, until it moves |
-  | wheels stand still, told to do 0.1 m/s or 0.3 rad/s at least, for 3 s | offline, until they turn |
+  | wheels stand still, told to do 0.1 m/s or 0.3 rad/s at least, for 3 s | offline, until they turn; disarmed, if a person arms them |
 
   A head whose reach is not known (`c:Hal.Ptz.reach/1`) is judged by where it stands only until it
   has moved for the first time: later it may be at its end.
@@ -29,7 +29,7 @@ defmodule Hal.Device.Obedience do
   @moved_turn 0.02
   @wheels_ms 3_000
 
-  defstruct refusals: %{}, wanted: nil, stood: nil, moved?: false, stuck?: false
+  defstruct refusals: %{}, wanted: nil, stood: nil, moved?: false, stuck?: false, late?: false
 
   @type request :: :look | :zoom | :drive | atom()
   @type refusal :: %{
@@ -42,14 +42,16 @@ defmodule Hal.Device.Obedience do
         }
   @typedoc """
   `wanted` is where a head is to look, or the speed that the wheels were given; `stood` where the
-  device stands since when, while it should move.
+  device stands since when, while it should move. It is `late?` while that has lasted too long, and `stuck?` from then on, until
+  it moves.
   """
   @type t :: %__MODULE__{
           refusals: %{request() => refusal()},
           wanted: {pan :: float(), tilt :: float()} | Twist.t() | nil,
           stood: {place :: term(), since_ms :: integer()} | nil,
           moved?: boolean(),
-          stuck?: boolean()
+          stuck?: boolean(),
+          late?: boolean()
         }
   @typedoc "The ranges of a head, in radians, `{least, greatest}` each; `nil` if they are not known."
   @type reach :: {pan :: {float(), float()}, tilt :: {float(), float()}} | nil
@@ -146,13 +148,14 @@ defmodule Hal.Device.Obedience do
     cond do
       moved?.(from) ->
         obedience = obeyed(obedience, request)
-        %{obedience | stood: {place, at_ms}, moved?: true, stuck?: false}
+        %{obedience | stood: {place, at_ms}, moved?: true, stuck?: false, late?: false}
 
       not due? ->
-        %{obedience | stood: {from, at_ms}}
+        %{obedience | stood: {from, at_ms}, late?: false}
 
       true ->
-        %{obedience | stuck?: obedience.stuck? or at_ms - since_ms >= limit}
+        late? = at_ms - since_ms >= limit
+        %{obedience | stuck?: obedience.stuck? or late?, late?: late?}
     end
   end
 

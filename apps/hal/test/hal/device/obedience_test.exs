@@ -110,7 +110,7 @@ defmodule Hal.Device.ObedienceTest do
       {:ok, clock: clock}
     end
 
-    defp device(kind, driver, clock) do
+    defp device(kind, driver, clock, options \\ []) do
       test = self()
       name = {test, kind}
 
@@ -125,11 +125,13 @@ defmodule Hal.Device.ObedienceTest do
 
       start_supervised!(
         {Device,
-         kind: kind,
-         driver: {driver, test: test, device: kind},
-         sinks: [{Kernel, :send, [test]}],
-         about: %{robot: test},
-         clock: {Agent, :get, [clock, &Function.identity/1]}}
+         [
+           kind: kind,
+           driver: {driver, test: test, device: kind},
+           sinks: [{Kernel, :send, [test]}],
+           about: %{robot: test},
+           clock: {Agent, :get, [clock, &Function.identity/1]}
+         ] ++ options}
       )
     end
 
@@ -187,6 +189,36 @@ defmodule Hal.Device.ObedienceTest do
       pid = device(:drive, Hal.FakeDrive, clock)
       assert_receive {:arming, %{state: :armed}}
 
+      stand(pid, clock)
+      assert_receive {:health, :drive, {{:offline, {:stands, :wheels}}, _}}
+      assert Device.arming(pid).state == :armed
+      send(pid, {:readings, [wheels(0.3, 0.3)]})
+      assert_receive {:health, :drive, {:online, _}}
+    end
+
+    test "whose wheels stand as with its emergency button pressed is disarmed, each time that a person has armed it",
+         %{
+           clock: clock
+         } do
+      pid = device(:drive, Hal.FakeDrive, clock, arm: :manual)
+      send(pid, {:readings, [wheels(0.0), {:report, :wheels}]})
+
+      for _ <- 1..2 do
+        assert Device.arm(pid) == :ok
+        assert_receive {:arming, %{state: :armed}}
+        stand(pid, clock)
+        assert_receive {:arming, %{state: :disarmed}}
+      end
+
+      assert_receive {:health, :drive, {{:offline, {:stands, :wheels}}, _}}
+      # The button is released: what is wished now turns no wheel.
+      Device.drive(pid, Twist.new(0.3, 0.0))
+      assert Device.arming(pid).state == :disarmed
+      assert Device.arming(pid).told == Twist.zero()
+    end
+
+    # Told to drive for 4 s, the wheels report that they stand.
+    defp stand(pid, clock) do
       for _ <- 1..5 do
         Device.drive(pid, Twist.new(0.3, 0.0))
         send(pid, {:readings, [wheels(0.0), {:report, :wheels}]})
@@ -196,11 +228,6 @@ defmodule Hal.Device.ObedienceTest do
         _ = :sys.get_state(pid)
         later(clock, 400)
       end
-
-      assert_receive {:health, :drive, {{:offline, {:stands, :wheels}}, _}}
-      assert Device.arming(pid).state == :armed
-      send(pid, {:readings, [wheels(0.3, 0.3)]})
-      assert_receive {:health, :drive, {:online, _}}
     end
   end
 end
