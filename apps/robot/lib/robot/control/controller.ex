@@ -241,7 +241,9 @@ defmodule Robot.Control.Controller do
   end
 
   # What its sonars have seen follows from its pose, and cannot correct it, but it tells whom walls hide.
-  defp given(percept, %OccupancyGrid{} = sensed), do: %{percept | grid: OccupancyGrid.grid(sensed)}
+  defp given(percept, %OccupancyGrid{} = sensed),
+    do: %{percept | grid: OccupancyGrid.grid(sensed)}
+
   defp given(percept, plan), do: %{percept | grid: plan}
 
   defp sense(%OccupancyGrid{} = sensed, percept, discs),
