@@ -13,6 +13,7 @@ defmodule Missions.Landmark.Follower do
   alias Robot.Percept.CameraPointing
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Behaviour.Patience
+  alias Robot.Navigation.Grid
   alias Swarm.Formation.Chain
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, LandmarkTrack, Marks, SlotPoses}
@@ -21,6 +22,9 @@ defmodule Missions.Landmark.Follower do
   @in_place 0.25
   @near 0.15
   @slow 0.05
+  # A robot that is unsure for this long turns; a slot that moved by less (metres) is the same one.
+  @unsure_ms 4_000
+  @same_slot 0.2
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
 
@@ -48,17 +52,22 @@ defmodule Missions.Landmark.Follower do
             late: [],
             told: {0, 0},
             landmark: nil,
+            unsure_ms: nil,
+            facing: nil,
             slot: nil,
             best: nil,
             best_ms: 0,
-            obstacle_ms: nil
+            obstacle_ms: nil,
+            stood?: false
 
   @typedoc """
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
   where the landmark stood when this robot was last in place. `best` is the least distance to
   `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
   `obstacle_ms`. `late` is the same, ignoring small moves of the slot: from each place where it was, how the robot has come nearer since.
-  `blocker` is what blocks a blocked robot.
+  A robot that has `stood?` in its slot may be pushed off it, but knows that there is room.
+  `blocker` is what blocks a blocked robot. `facing` is the heading in which it stands in a slot to make sure of its place, and it
+  has been unsure since `unsure_ms`.
   """
   @type t :: %__MODULE__{
           in_place?: boolean(),
@@ -69,10 +78,13 @@ defmodule Missions.Landmark.Follower do
           late: [{Pose.t(), Patience.t()}],
           told: {non_neg_integer(), non_neg_integer()},
           landmark: {integer(), integer()} | nil,
+          unsure_ms: integer() | nil,
+          facing: {Pose.t(), heading :: float()} | nil,
           slot: Pose.t() | nil,
           best: float() | nil,
           best_ms: integer(),
-          obstacle_ms: integer() | nil
+          obstacle_ms: integer() | nil,
+          stood?: boolean()
         }
 
   @doc "The state of a robot that does not follow anybody yet."
@@ -121,6 +133,7 @@ defmodule Missions.Landmark.Follower do
     sure? = Marks.sure?(mission, error)
 
     {told, place} = pass_on(mission)
+    {leader, _twist} = SlotPoses.leader(mission.anchor, age_ms)
 
     mission = %{
       mission
@@ -138,11 +151,56 @@ defmodule Missions.Landmark.Follower do
     }
 
     mission = %{mission | follower: mission |> block(slot, error) |> late(mission, slot, error)}
-    options = [target: slot, velocity: velocity, discs: discs(mission.anchor)]
+    mission = %{mission | follower: turn(mission.follower, mission, slot, error, leader)}
+
+    options = [
+      target: faced(slot, mission.follower),
+      velocity: velocity,
+      discs: discs(mission.anchor)
+    ]
+
     goal = {:goal, {:slot, mission.epoch}, {Robot.Behaviour.Follow, options}}
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
+
+  # A robot that has been unsure of its place for a while turns to what it can make sure by, one after the other, and
+  # stays turned, because it would not be in place while it turned back.
+  defp turn(follower, %{now_ms: now} = mission, slot, error, leader) do
+    since_ms = unsure_ms(follower, error, now)
+    facing = follower.facing
+    facing = if facing && Pose.distance(elem(facing, 0), slot) < @same_slot, do: facing
+    follower = %{follower | unsure_ms: since_ms, facing: facing}
+
+    with true <- follower.unsure? and now - since_ms >= @unsure_ms,
+         [_ | _] = marks <- visible(mission, leader) do
+      mark = Enum.at(marks, rem(div(now - since_ms, @unsure_ms) - 1, length(marks)))
+      {x, y} = {mission.percept.pose.x, mission.percept.pose.y}
+      heading = :math.atan2(elem(mark, 1) - y, elem(mark, 0) - x)
+      %{follower | facing: {slot, heading}}
+    else
+      _sure -> follower
+    end
+  end
+
+  defp unsure_ms(%{in_place?: true}, _error, _now), do: nil
+  defp unsure_ms(_follower, error, _now) when error > @in_place, do: nil
+  defp unsure_ms(%{unsure?: true, unsure_ms: nil}, _error, now), do: now
+  defp unsure_ms(follower, _error, _now), do: follower.unsure_ms
+
+  # What no known wall hides of the leader, the landmark, and the robots ahead.
+  defp visible(%{anchor: anchor, percept: %{grid: grid} = percept} = mission, leader) do
+    ahead = for id <- Enum.take_while(anchor.order, &(&1 != mission.me)), do: percept.peers[id]
+    robots = for %{pose: pose} <- ahead, do: Pose.point(pose)
+    from = Pose.point(percept.pose)
+
+    for at <- [Pose.point(leader), SlotPoses.landmark(anchor) | robots],
+        at != nil and (grid == nil or Grid.free_line?(grid, from, at, 0.0)),
+        do: at
+  end
+
+  defp faced(slot, %{facing: nil}), do: slot
+  defp faced(slot, %{facing: {_slot, heading}}), do: %{slot | heading: heading}
 
   # A robot that stands where it should, as far as it knows, is not blocked.
   defp block(
@@ -151,7 +209,7 @@ defmodule Missions.Landmark.Follower do
          error
        )
        when in_place? or unsure?,
-       do: fresh(follower, slot, error, mission.now_ms)
+       do: %{fresh(follower, slot, error, mission.now_ms) | stood?: true}
 
   defp block(%{follower: follower, now_ms: now} = mission, slot, error) do
     cond do
@@ -163,7 +221,8 @@ defmodule Missions.Landmark.Follower do
 
       true ->
         follower = watch(follower, mission, slot, error)
-        obstacle? = follower.obstacle_ms != nil and now - follower.obstacle_ms >= @obstacle_ms
+        since_ms = if follower.stood?, do: nil, else: follower.obstacle_ms
+        obstacle? = since_ms != nil and now - since_ms >= @obstacle_ms
         stuck? = error < @reach and now - follower.best_ms >= @stuck_ms
         %{follower | blocked?: obstacle? or stuck?}
     end
@@ -213,7 +272,15 @@ defmodule Missions.Landmark.Follower do
   defp blocker(follower, _mission, _slot, true), do: follower.blocker
 
   defp fresh(follower, slot, error, now) do
-    %{follower | slot: slot, best: error, best_ms: now, obstacle_ms: nil, blocked?: false}
+    %{
+      follower
+      | slot: slot,
+        best: error,
+        best_ms: now,
+        obstacle_ms: nil,
+        blocked?: false,
+        stood?: false
+    }
   end
 
   defp watch(follower, mission, slot, error) do

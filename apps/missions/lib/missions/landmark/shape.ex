@@ -45,12 +45,14 @@ defmodule Missions.Landmark.Shape do
             rung: :asked,
             spots: nil,
             barred: [],
+            proven: [],
             chosen: nil,
             fit_ms: nil
 
   @typedoc """
   `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
-  slots of the formation; `barred` are places where a follower was blocked. The choice was made for `chosen`: the request, the number of followers, how often they could not
+  slots of the formation; `barred` are places where a follower was blocked, `proven`
+  those where one has stood. The choice was made for `chosen`: the request, the number of followers, how often they could not
   get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
   """
   @type t :: %__MODULE__{
@@ -61,6 +63,7 @@ defmodule Missions.Landmark.Shape do
           rung: Ladder.rung() | nil,
           spots: [Pose.t()] | nil,
           barred: [Pose.point()],
+          proven: [Pose.t()],
           chosen: {Formation.t(), non_neg_integer(), non_neg_integer(), Pose.point()} | nil,
           fit_ms: integer() | nil
         }
@@ -92,6 +95,7 @@ defmodule Missions.Landmark.Shape do
     case shape.chosen do
       {formation, followers, squeeze, at} when {formation, followers, squeeze} == asked ->
         moved = Pose.distance(at, pose)
+        shape = prove(shape, mission)
         fits? = fits?(shape, here, space)
         shape = if fits?, do: %{shape | fit_ms: now}, else: shape
 
@@ -139,7 +143,21 @@ defmodule Missions.Landmark.Shape do
   defp fits?(%{spots: nil} = shape, here, space),
     do: Ladder.choose([:asked], shape.formation, length(elem(shape.room, 1)), here, space) != nil
 
-  defp fits?(%{spots: spots}, _here, space), do: Enum.all?(spots, &Space.free?(space, &1))
+  defp fits?(%{spots: spots, proven: proven}, _here, space),
+    do: Enum.all?(spots, &(&1 in proven or Space.free?(space, &1)))
+
+  # Where a follower has stood in its place there is room, whatever walls sonars seem to see later.
+  defp prove(%{spots: nil} = shape, _mission), do: shape
+
+  defp prove(%{spots: spots, proven: proven} = shape, mission) do
+    more =
+      for {index, %{in_place: true}} <- followers(mission),
+          spot = Enum.at(spots, index),
+          spot not in proven,
+          do: spot
+
+    %{shape | proven: more ++ proven}
+  end
 
   defp choose(shape, {asked, followers, _squeeze} = whom, here, space, rungs, now) do
     choice = Ladder.choose(rungs, asked, followers, here, space)
@@ -189,6 +207,7 @@ defmodule Missions.Landmark.Shape do
       | formation: choice.formation,
         room: choice.room,
         spots: choice.spots,
+        proven: Enum.filter(shape.proven, &(&1 in (choice.spots || []))),
         rung: choice.rung,
         trail?: choice.spots != nil,
         chosen: {asked, followers, squeeze, Pose.point(here.pose)},

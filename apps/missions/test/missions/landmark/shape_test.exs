@@ -2,6 +2,7 @@ defmodule Missions.Landmark.ShapeTest do
   @moduledoc "What a leader that knows no walls makes of followers that are blocked."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Navigation.Grid
   alias Robot.Percept
   alias Missions.Landmark
   alias Missions.Landmark.{Beat, Shape}
@@ -76,6 +77,18 @@ defmodule Missions.Landmark.ShapeTest do
     assert [^a, another, ^c, ^d] = again.spots
     assert another not in [b, other]
     assert length(again.barred) == 2
+  end
+
+  test "a place in which a robot has stood is kept, whatever sonars see there later" do
+    shape = run([claims(@ids)])
+    there = claims([]) |> rest() |> mission(10_000)
+    {x, y} = shape.spots |> List.last() |> Pose.point()
+    wall = Grid.new(<<1>>, {1, 1}, 0.2, {x - 0.1, y - 0.1}, closed?: false)
+    walled = &put_in(&1.percept.grid, wall)
+
+    stood = Shape.update(shape, there, 1.6)
+    assert Shape.update(stood, walled.(there), 1.6).spots == shape.spots
+    assert Shape.update(shape, walled.(mission(claims([]), 10_000)), 1.6).spots != shape.spots
   end
 
   test "after the last spacing comes the column along its way, then the cluster" do

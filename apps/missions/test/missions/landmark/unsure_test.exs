@@ -62,6 +62,13 @@ defmodule Missions.Landmark.UnsureTest do
     end).follower
   end
 
+  test "one that stays unsure turns to its leader, and one that is sure does not" do
+    assert stand(0.1, 0.62, 3).facing == nil
+    assert {_slot, heading} = stand(0.1, 0.62, 5).facing
+    assert_in_delta heading, 0.0, 1.0e-6
+    assert stand(0.1, 0.3, 5).facing == nil
+  end
+
   test "it reports unsure, and neither in place nor blocked" do
     assert %{unsure?: true, in_place?: false} = stand(0.1, 0.62, 1)
     assert %{unsure?: true, blocked?: false, blocker: nil, late: []} = stand(0.1, 0.62, 30)

@@ -240,9 +240,11 @@ defmodule Robot.Control.Controller do
     {percept, %{controller | percept: percept}}
   end
 
-  # What its sonars have seen follows from its pose, and cannot correct it.
-  defp given(percept, %Grid{} = plan), do: %{percept | grid: plan}
-  defp given(percept, _sonar_or_none), do: %{percept | grid: nil}
+  # What its sonars have seen follows from its pose, and cannot correct it, but it tells whom walls hide.
+  defp given(percept, %OccupancyGrid{} = sensed),
+    do: %{percept | grid: OccupancyGrid.grid(sensed)}
+
+  defp given(percept, plan), do: %{percept | grid: plan}
 
   defp sense(%OccupancyGrid{} = sensed, percept, discs),
     do: OccupancyGrid.update(sensed, percept, discs)
