@@ -67,7 +67,9 @@ defmodule Robot.Behaviour.Goto do
   defp wait(state, %{at_ms: at_ms}),
     do: %{state | patience: Patience.wait(state.patience, at_ms)}
 
+  # It lets another pass, which is no failure of its own.
   @impl Robot.Behaviour
+  def routed(:waits, _percept, state), do: {__MODULE__, %{state | patience: nil}}
   def routed(:no_way, _percept, state), do: {__MODULE__, %{state | way?: false}}
 
   def routed({:left, metres}, %{at_ms: at_ms}, state),

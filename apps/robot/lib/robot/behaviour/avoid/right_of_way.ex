@@ -1,0 +1,210 @@
+defmodule Robot.Behaviour.Avoid.RightOfWay do
+  @moduledoc """
+  Decides which of two robots goes on that meet where only one fits, by what each knows of the other's place. Pure.
+
+  Each looks for its nearest passing place and the other's (`Robot.Navigation.PassingPlace`). The one that would have to go
+  farther back goes on; of two that have about as far, the one whose name comes first. The other goes to its place, and
+  waits there until the way is free, or the other has not moved for some seconds. If they judged differently, because each
+  knows the other's place only nearly, they meet again, or stand before each other: then names decide.
+  """
+  alias Hal.Pose
+  alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Navigation.PassingPlace
+  alias Robot.Percept
+
+  # So far ahead on its way (metres) a robot looks for others.
+  @ahead 5.0
+  # Bodies so near to a way (metres) are on it.
+  @beside 0.1
+  # Whoever has a passing place so near (metres) gets past by keeping aside.
+  @easy 0.35
+  # Whose name comes first may have so much less to go back (metres).
+  @first 0.3
+  # Two robots so near (metres) that have stood before each other for so long have judged differently.
+  @facing 0.8
+  @facing_ms 3_000
+  # The way is free when the other has been off it for so long.
+  @free_ms 700
+  # Whoever waits goes on if the other has stood for so long, or at last after so long; and waits for the same one so often.
+  @still_ms 6_000
+  @longest_ms 40_000
+  @often 3
+
+  defstruct now: nil, met: %{}, facing: nil
+
+  @typedoc "Whom it meets: `place`, where it waits, `nil` if it goes on; `line`, its way, by which it sees that it is free."
+  @type meeting :: %{
+          id: atom(),
+          place: Pose.point() | nil,
+          line: [Pose.point(), ...],
+          since_ms: integer(),
+          moved_ms: integer(),
+          on_ms: integer()
+        }
+
+  @typedoc "`met` counts how often it has met each; `facing` is before whom it stands, and since when."
+  @type t :: %__MODULE__{
+          now: meeting() | nil,
+          met: %{atom() => pos_integer()},
+          facing: {atom(), integer()} | nil
+        }
+
+  @doc """
+  Which of two goes on: each by its name and how far it has to go to a passing place (metres), `nil` if it has none. Neither need wait
+  if both are beside one, and neither can if both have none.
+
+      iex> alias Robot.Behaviour.Avoid.RightOfWay
+      iex> for {a, b} <- [{0.0, 0.2}, {2.0, 0.5}, {0.5, 2.0}, {0.5, 0.7}, {nil, 4.0}, {4.0, nil}, {nil, nil}],
+      ...>     do: RightOfWay.first({:mag1, a}, {:mag2, b})
+      [nil, :mag1, :mag2, :mag1, :mag1, :mag2, nil]
+  """
+  @spec first({atom(), float() | nil}, {atom(), float() | nil}, [:by_name]) :: atom() | nil
+  def first(one, other, how \\ [])
+  def first({_a, nil}, {_b, nil}, _how), do: nil
+  def first({a, nil}, _other, _how), do: a
+  def first(_one, {b, nil}, _how), do: b
+  def first({a, _back}, {b, _other_back}, [:by_name]), do: min(a, b)
+  def first({a, _} = one, {b, _} = other, how) when b < a, do: first(other, one, how)
+  def first({_a, x}, {_b, y}, _how) when x <= @easy and y <= @easy, do: nil
+  def first({a, x}, {b, y}, _how), do: if(x + @first > y, do: a, else: b)
+
+  @doc """
+  Whether the robot goes to a place and waits there now, and the next state. `corners` are those of its way, `[]` if it has none
+  yet; `robots` are all others.
+  """
+  @spec note(t(), [Pose.point()], Percept.t(), [Neighbours.t()]) ::
+          {{:wait, Pose.point()} | :go, t()}
+  def note(%__MODULE__{} = right, _corners, %Percept{grid: nil}, _robots), do: {:go, right}
+
+  def note(%__MODULE__{now: nil} = right, corners, percept, robots) do
+    line = [Pose.point(percept.pose) | corners]
+    near = Enum.take_while(robots, &(&1.gap < @ahead))
+    coming = Enum.filter(near, &(not &1.fixed? and oncoming?(&1, line, percept)))
+    right = face(right, coming, percept)
+
+    case Enum.find(coming, &(not &1.standing? or faced?(right, &1, percept))) do
+      nil -> {:go, right}
+      other -> meet(right, other, line, percept, near)
+    end
+  end
+
+  def note(%__MODULE__{now: %{id: id} = now} = right, corners, percept, robots) do
+    other = Enum.find(robots, &(&1.id == id and not &1.fixed?))
+    now = other && seen(now, other, corners, percept)
+
+    cond do
+      now == nil or over?(now, percept.at_ms) -> note(%{right | now: nil}, corners, percept, [])
+      now.place != nil -> {{:wait, now.place}, %{right | now: now}}
+      true -> go_on(%{right | now: now}, other, corners, percept, robots)
+    end
+  end
+
+  # Whoever goes on may stand before one that does, too.
+  defp go_on(right, other, corners, percept, robots) do
+    right = face(right, [other], percept)
+
+    if faced?(right, other, percept),
+      do: meet(right, other, [Pose.point(percept.pose) | corners], percept, robots),
+      else: {:go, right}
+  end
+
+  defp seen(now, other, corners, percept) do
+    line = if now.place, do: now.line, else: [Pose.point(percept.pose) | corners]
+    at_ms = percept.at_ms
+
+    %{
+      now
+      | moved_ms: if(other.standing?, do: now.moved_ms, else: at_ms),
+        on_ms: if(oncoming?(other, line, percept), do: at_ms, else: now.on_ms)
+    }
+  end
+
+  defp over?(now, at_ms) do
+    at_ms - now.on_ms >= @free_ms or at_ms - now.moved_ms >= @still_ms or
+      at_ms - now.since_ms >= @longest_ms
+  end
+
+  defp meet(%{met: met} = right, %{id: id} = other, line, percept, robots) do
+    often = Map.get(met, id, 0)
+    me = {Pose.point(percept.pose), percept.profile.radius}
+    it = {other.at, other.radius}
+    others = for %{id: third} = robot <- robots, third != id, do: {robot.at, robot.radius}
+
+    [mine, its] =
+      for {a, b} <- [{me, it}, {it, me}], do: PassingPlace.nearest(percept.grid, a, b, others)
+
+    how = if often > 0 or faced?(right, other, percept), do: [:by_name], else: []
+
+    case first({percept.robot, back(mine)}, {id, back(its)}, how) do
+      nil ->
+        {:go, right}
+
+      _any when often >= @often ->
+        {:go, right}
+
+      winner ->
+        place = if winner == id, do: elem(mine, 1)
+        at_ms = percept.at_ms
+        way = if place, do: [place | line], else: line
+        now = %{id: id, place: place, line: way, since_ms: at_ms, moved_ms: at_ms, on_ms: at_ms}
+        right = %{right | now: now, met: Map.put(met, id, often + 1), facing: nil}
+        {if(place, do: {:wait, place}, else: :go), right}
+    end
+  end
+
+  defp back({:ok, _place, metres}), do: metres
+  defp back(:error), do: nil
+
+  # Before whom it has stood for a while.
+  defp face(right, coming, %{at_ms: at_ms}) do
+    case {Enum.find(coming, &(&1.standing? and &1.gap < @facing)), right.facing} do
+      {nil, _before} -> %{right | facing: nil}
+      {%{id: id}, {id, _since}} -> right
+      {%{id: id}, _other} -> %{right | facing: {id, at_ms}}
+    end
+  end
+
+  defp faced?(%{facing: {id, since_ms}}, %{id: id}, %{at_ms: at_ms}),
+    do: at_ms - since_ms >= @facing_ms
+
+  defp faced?(_right, _other, _percept), do: false
+
+  # Whether it is on the line, and drives, or stands turned, against its direction.
+  defp oncoming?(other, line, percept) do
+    reach = percept.profile.radius + other.radius + @beside
+
+    {distance, {ux, uy}} = nearest(line, other.at)
+    {vx, vy} = direction(other, percept)
+    distance < reach and vx * ux + vy * uy < -0.3
+  end
+
+  defp direction(%{standing?: true, id: id}, %{peers: peers}) do
+    heading = peers[id].pose.heading
+    {:math.cos(heading), :math.sin(heading)}
+  end
+
+  defp direction(%{velocity: {vx, vy}}, _percept) do
+    size = :math.sqrt(vx * vx + vy * vy)
+    {vx / size, vy / size}
+  end
+
+  # How near the first 5 m of a line come to a point, and the line's direction there.
+  defp nearest(line, at) do
+    {nearest, _left} =
+      Enum.zip_reduce(line, tl(line), {{@ahead, {0.0, 0.0}}, @ahead}, fn a, b, {nearest, left} ->
+        length = Pose.distance(a, b)
+
+        if left <= 0.0 or length < 1.0e-6,
+          do: {nearest, left},
+          else: {min(nearest, near(a, b, length, min(left, length), at)), left - length}
+      end)
+
+    nearest
+  end
+
+  defp near({ax, ay}, {bx, by}, length, end_m, {x, y}) do
+    {ux, uy} = {(bx - ax) / length, (by - ay) / length}
+    along = ((x - ax) * ux + (y - ay) * uy) |> max(0.0) |> min(end_m)
+    {Pose.distance({ax + along * ux, ay + along * uy}, {x, y}), {ux, uy}}
+  end
+end
