@@ -12,13 +12,15 @@ defmodule Robot.Navigation.PassingPlace do
   @typedoc "A round body: its place and radius."
   @type body :: {Pose.point(), radius :: float()}
 
-  # The room between two bodies that pass, and between one that stands aside and a wall.
+  # The room between two bodies that pass: the least, and what is worth some way (metres); and between one that stands
+  # aside and a wall.
   @between 0.12
+  @roomy {0.3, 0.6}
   @wall 0.1
-  # It is looked for this far away, and so much farther than the first one, for one where less room is taken.
+  # It is looked for this far away, and so much farther than the first one.
   @farthest 8.0
-  @farther 0.5
-  # A place that leaves one step of the ring less to the other is worth so long a way.
+  @farther 1.0
+  # A place where one step of the ring less is free, so that it is less in the way, is worth so long a way.
   @step 0.02
 
   @steps 24
@@ -37,11 +39,10 @@ defmodule Robot.Navigation.PassingPlace do
   """
   @spec passes?(Grid.t(), Pose.point(), own :: float(), other :: float(), [body()]) :: boolean()
   def passes?(grid, place, own, other, bodies \\ []),
-    do: stretches(free(grid, place, own, other, bodies)) == 1
+    do: stretches(free(grid, place, own + other + @between, other, bodies)) == 1
 
   # By step of the ring, whether the other fits there.
-  defp free(grid, {x, y}, own, other, bodies) do
-    radius = own + other + @between
+  defp free(grid, {x, y}, radius, other, bodies) do
     room = Reach.room(other)
 
     for {c, s} <- @ring, at = {x + radius * c, y + radius * s} do
@@ -76,11 +77,14 @@ defmodule Robot.Navigation.PassingPlace do
     apart = min(own + other, Pose.distance(from, other_at) - grid.cell)
     reach? = &(Grid.free?(grid, &1, Reach.room(own)) and Pose.distance(&1, other_at) >= apart)
 
+    {roomy, worth} = @roomy
+
     cost = fn place ->
       if Grid.free?(grid, place, own + @wall) and
-           Enum.all?(bodies, fn {at, r} -> Pose.distance(at, place) >= r + own + @between end) do
-        free = free(grid, place, own, other, bodies)
-        if stretches(free) == 1, do: @step * Enum.count(free, & &1)
+           Enum.all?(bodies, fn {at, r} -> Pose.distance(at, place) >= r + own + @between end) and
+           passes?(grid, place, own, other, bodies) do
+        free = free(grid, place, own + other + roomy, other, bodies)
+        @step * Enum.count(free, & &1) + if(stretches(free) == 1, do: 0.0, else: worth)
       end
     end
 
