@@ -212,13 +212,9 @@ defmodule Robot.Behaviour.Avoid do
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
 
-    {aside, progress} =
-      Progress.note(
-        state.progress,
-        way && Avoid.Route.left(way, Pose.point(percept.pose)),
-        percept.robot,
-        percept.at_ms
-      )
+    # Whoever goes on, or back, past another gives it time.
+    left = if way && state.right.now == nil, do: Avoid.Route.left(way, Pose.point(percept.pose))
+    {aside, progress} = Progress.note(state.progress, left, percept.robot, percept.at_ms)
 
     preferred =
       wish.velocity

@@ -4,7 +4,8 @@ defmodule Robot.Navigation.PassingPlace do
   frame of the map.
 
   A body leaves a way if a ring about it, as wide as the other needs it to be, has one stretch on which the other fits: it
-  gets from any point of that to any other. In a corridor for one there are two, before the body and behind it.
+  gets from any point of that to any other. In a corridor for one there are two, before the body and behind it. In a niche
+  where the other does not come so near there is none; then a wider ring tells.
   """
   alias Hal.Pose
   alias Robot.Navigation.{Grid, Reach}
@@ -14,16 +15,17 @@ defmodule Robot.Navigation.PassingPlace do
 
   # The room between two bodies that pass: the least, and what is worth some way (metres); and between one that stands
   # aside and a wall.
-  @between 0.12
-  @roomy {0.3, 0.6}
+  @between 0.2
+  @wider [0.0, 0.2, 0.4]
+  @roomy {0.35, 0.6}
   @wall 0.1
   # It is looked for this far away, and so much farther than the first one.
   @farthest 8.0
   @farther 1.0
   # A place where one step of the ring less is free, so that it is less in the way, is worth so long a way.
-  @step 0.02
+  @step 0.015
 
-  @steps 24
+  @steps 36
   @ring for k <- 0..(@steps - 1),
             a = 2 * :math.pi() * k / @steps,
             do: {:math.cos(a), :math.sin(a)}
@@ -39,24 +41,31 @@ defmodule Robot.Navigation.PassingPlace do
   """
   @spec passes?(Grid.t(), Pose.point(), own :: float(), other :: float(), [body()]) :: boolean()
   def passes?(grid, place, own, other, bodies \\ []),
-    do: stretches(free(grid, place, own + other + @between, other, bodies)) == 1
+    do: alone?(free(grid, place, own + other + @between, other, bodies))
 
   # By step of the ring, whether the other fits there.
   defp free(grid, {x, y}, radius, other, bodies) do
     room = Reach.room(other)
 
-    for {c, s} <- @ring, at = {x + radius * c, y + radius * s} do
-      Grid.free?(grid, at, room) and
-        Enum.all?(bodies, fn {body, r} -> Pose.distance(body, at) >= r + room end)
-    end
+    Enum.find_value(@wider, [], fn wider ->
+      r = radius + wider
+
+      free =
+        for {c, s} <- @ring, at = {x + r * c, y + r * s} do
+          Grid.free?(grid, at, room) and
+            Enum.all?(bodies, fn {body, r} -> Pose.distance(body, at) >= r + room end)
+        end
+
+      if Enum.any?(free), do: free
+    end)
   end
 
-  # A closed ring without an end is one stretch.
-  defp stretches(free) do
-    case Enum.zip(free, tl(free) ++ [hd(free)]) |> Enum.count(&(&1 == {false, true})) do
-      0 -> if hd(free), do: 1, else: 0
-      count -> count
-    end
+  # Whether it is one stretch: it begins once, or has no end.
+  defp alone?([]), do: false
+
+  defp alone?(free) do
+    begins = free |> Enum.zip(tl(free) ++ [hd(free)]) |> Enum.count(&(&1 == {false, true}))
+    begins == 1 or (begins == 0 and hd(free))
   end
 
   @doc """
@@ -84,7 +93,7 @@ defmodule Robot.Navigation.PassingPlace do
            Enum.all?(bodies, fn {at, r} -> Pose.distance(at, place) >= r + own + @between end) and
            passes?(grid, place, own, other, bodies) do
         free = free(grid, place, own + other + roomy, other, bodies)
-        @step * Enum.count(free, & &1) + if(stretches(free) == 1, do: 0.0, else: worth)
+        @step * Enum.count(free, & &1) + if(alone?(free), do: 0.0, else: worth)
       end
     end
 

@@ -12,25 +12,28 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   alias Robot.Navigation.PassingPlace
   alias Robot.Percept
 
-  # So far ahead on its way (metres) a robot looks for others.
+  # So far ahead on its way (metres) a robot looks for others, and so far for whom it has met.
   @ahead 5.0
+  @met_ahead 9.0
   # Bodies so near to a way (metres) are on it.
   @beside 0.1
   # Whoever has a passing place so near (metres) gets past by keeping aside.
   @easy 0.35
   # Whose name comes first may have so much less to go back (metres).
   @first 0.3
-  # Two robots so near (metres) that have stood before each other for so long have judged differently.
+  # Two robots so near (metres) that have been before each other for so long, no faster than so (m/s), have judged
+  # differently.
   @facing 0.8
   @facing_ms 3_000
+  @slow 0.1
   # The way is free when the other has been off it for so long.
   @free_ms 700
-  # Whoever waits goes on if the other has stood for so long, or at last after so long; and waits for the same one so often.
+  # Whoever waits goes on if the other has stood for so long, or at last after so long; and waits so often in vain.
   @still_ms 6_000
   @longest_ms 40_000
   @often 3
 
-  defstruct now: nil, met: %{}, facing: nil
+  defstruct now: nil, vain: %{}, facing: nil
 
   @typedoc "Whom it meets: `place`, where it waits, `nil` if it goes on; `line`, its way, by which it sees that it is free."
   @type meeting :: %{
@@ -42,10 +45,13 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
           on_ms: integer()
         }
 
-  @typedoc "`met` counts how often it has met each; `facing` is before whom it stands, and since when."
+  @typedoc """
+  `vain` counts how often meeting each came to nothing since it last passed that one; `facing` is before whom it stands, and
+  since when.
+  """
   @type t :: %__MODULE__{
           now: meeting() | nil,
-          met: %{atom() => pos_integer()},
+          vain: %{atom() => pos_integer()},
           facing: {atom(), integer()} | nil
         }
 
@@ -79,119 +85,111 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   def note(%__MODULE__{now: nil} = right, corners, percept, robots) do
     line = [Pose.point(percept.pose) | corners]
     near = Enum.take_while(robots, &(&1.gap < @ahead))
-    coming = Enum.filter(near, &(not &1.fixed? and oncoming?(&1, line, percept)))
-    right = face(right, coming, percept)
+    there = Enum.filter(near, &(not &1.fixed? and on?(&1, line, @ahead, percept)))
+    right = face(right, there, percept)
 
-    case Enum.find(coming, &(not &1.standing? or faced?(right, &1, percept))) do
+    case Enum.find(there, &(not &1.standing? or faced?(right, &1, percept))) do
       nil -> {:go, right}
-      other -> meet(right, other, line, percept, near)
+      other -> meet(right, other, line, percept, robots)
     end
   end
 
   def note(%__MODULE__{now: %{id: id} = now} = right, corners, percept, robots) do
+    here = [Pose.point(percept.pose) | corners]
     other = Enum.find(robots, &(&1.id == id and not &1.fixed?))
-    now = other && seen(now, other, corners, percept)
+    now = other && seen(now, other, if(now.place, do: now.line, else: here), percept)
+    right = if now && now.place == nil, do: face(right, [other], percept), else: right
 
     cond do
-      now == nil or over?(now, percept.at_ms) -> note(%{right | now: nil}, corners, percept, [])
-      now.place != nil -> {{:wait, now.place}, %{right | now: now}}
-      true -> go_on(%{right | now: now}, other, corners, percept, robots)
+      now == nil or free?(now, percept) ->
+        note(%{right | now: nil, vain: Map.delete(right.vain, id)}, corners, percept, [])
+
+      vain?(now, percept) ->
+        note(in_vain(right, id), corners, percept, [])
+
+      now.place != nil ->
+        {{:wait, now.place}, %{right | now: now}}
+
+      # The other goes on, too.
+      faced?(right, other, percept) ->
+        right |> in_vain(id) |> meet(other, here, percept, robots)
+
+      true ->
+        {:go, %{right | now: now}}
     end
   end
 
-  # Whoever goes on may stand before one that does, too.
-  defp go_on(right, other, corners, percept, robots) do
-    right = face(right, [other], percept)
-
-    if faced?(right, other, percept),
-      do: meet(right, other, [Pose.point(percept.pose) | corners], percept, robots),
-      else: {:go, right}
-  end
-
-  defp seen(now, other, corners, percept) do
-    line = if now.place, do: now.line, else: [Pose.point(percept.pose) | corners]
-    at_ms = percept.at_ms
-
+  defp seen(now, other, line, %{at_ms: at_ms} = percept) do
     %{
       now
       | moved_ms: if(other.standing?, do: now.moved_ms, else: at_ms),
-        on_ms: if(oncoming?(other, line, percept), do: at_ms, else: now.on_ms)
+        on_ms: if(on?(other, line, @met_ahead, percept), do: at_ms, else: now.on_ms)
     }
   end
 
-  defp over?(now, at_ms) do
-    at_ms - now.on_ms >= @free_ms or at_ms - now.moved_ms >= @still_ms or
-      at_ms - now.since_ms >= @longest_ms
-  end
+  defp free?(now, %{at_ms: at_ms}), do: at_ms - now.on_ms >= @free_ms
 
-  defp meet(%{met: met} = right, %{id: id} = other, line, percept, robots) do
-    often = Map.get(met, id, 0)
+  defp vain?(now, %{at_ms: at_ms}),
+    do: at_ms - now.moved_ms >= @still_ms or at_ms - now.since_ms >= @longest_ms
+
+  defp in_vain(right, id),
+    do: %{right | now: nil, vain: Map.update(right.vain, id, 1, &(&1 + 1))}
+
+  defp meet(right, %{id: id} = other, line, percept, robots) do
+    vain = Map.get(right.vain, id, 0)
     me = {Pose.point(percept.pose), percept.profile.radius}
     it = {other.at, other.radius}
-    others = for %{id: third} = robot <- robots, third != id, do: {robot.at, robot.radius}
+    third = for robot <- robots, robot.id != id, do: {robot.at, robot.radius}
 
     [mine, its] =
-      for {a, b} <- [{me, it}, {it, me}], do: PassingPlace.nearest(percept.grid, a, b, others)
+      for {a, b} <- [{me, it}, {it, me}], do: PassingPlace.nearest(percept.grid, a, b, third)
 
-    how = if often > 0 or faced?(right, other, percept), do: [:by_name], else: []
+    how = if vain > 0 or faced?(right, other, percept), do: [:by_name], else: []
+    first = first({percept.robot, back(mine)}, {id, back(its)}, how)
 
-    case first({percept.robot, back(mine)}, {id, back(its)}, how) do
-      nil ->
-        {:go, right}
-
-      _any when often >= @often ->
-        {:go, right}
-
-      winner ->
-        place = if winner == id, do: elem(mine, 1)
-        at_ms = percept.at_ms
-        way = if place, do: [place | line], else: line
-        now = %{id: id, place: place, line: way, since_ms: at_ms, moved_ms: at_ms, on_ms: at_ms}
-        right = %{right | now: now, met: Map.put(met, id, often + 1), facing: nil}
-        {if(place, do: {:wait, place}, else: :go), right}
+    if first == nil or vain >= @often do
+      {:go, right}
+    else
+      place = if first == id, do: elem(mine, 1)
+      at_ms = percept.at_ms
+      line = if place, do: [place | line], else: line
+      now = %{id: id, place: place, line: line, since_ms: at_ms, moved_ms: at_ms, on_ms: at_ms}
+      {if(place, do: {:wait, place}, else: :go), %{right | now: now, facing: nil}}
     end
   end
 
   defp back({:ok, _place, metres}), do: metres
   defp back(:error), do: nil
 
-  # Before whom it has stood for a while.
-  defp face(right, coming, %{at_ms: at_ms}) do
-    case {Enum.find(coming, &(&1.standing? and &1.gap < @facing)), right.facing} do
+  # Before whom it has been for a while.
+  defp face(right, there, %{at_ms: at_ms}) do
+    case {Enum.find(there, &(&1.gap < @facing and slow?(&1))), right.facing} do
       {nil, _before} -> %{right | facing: nil}
       {%{id: id}, {id, _since}} -> right
       {%{id: id}, _other} -> %{right | facing: {id, at_ms}}
     end
   end
 
+  defp slow?(%{velocity: {vx, vy}}), do: vx * vx + vy * vy < @slow * @slow
+
   defp faced?(%{facing: {id, since_ms}}, %{id: id}, %{at_ms: at_ms}),
     do: at_ms - since_ms >= @facing_ms
 
   defp faced?(_right, _other, _percept), do: false
 
-  # Whether it is on the line, and drives, or stands turned, against its direction.
-  defp oncoming?(other, line, percept) do
-    reach = percept.profile.radius + other.radius + @beside
+  # Whether it is on the line, and stands there or drives against its direction.
+  defp on?(%{velocity: {vx, vy}} = other, line, ahead, percept) do
+    {distance, {ux, uy}} = nearest(line, other.at, ahead)
+    speed = :math.sqrt(vx * vx + vy * vy)
 
-    {distance, {ux, uy}} = nearest(line, other.at)
-    {vx, vy} = direction(other, percept)
-    distance < reach and vx * ux + vy * uy < -0.3
+    distance < percept.profile.radius + other.radius + @beside and
+      (other.standing? or vx * ux + vy * uy < -0.3 * speed)
   end
 
-  defp direction(%{standing?: true, id: id}, %{peers: peers}) do
-    heading = peers[id].pose.heading
-    {:math.cos(heading), :math.sin(heading)}
-  end
-
-  defp direction(%{velocity: {vx, vy}}, _percept) do
-    size = :math.sqrt(vx * vx + vy * vy)
-    {vx / size, vy / size}
-  end
-
-  # How near the first 5 m of a line come to a point, and the line's direction there.
-  defp nearest(line, at) do
+  # How near the first metres of a line come to a point, and the line's direction there.
+  defp nearest(line, at, ahead) do
     {nearest, _left} =
-      Enum.zip_reduce(line, tl(line), {{@ahead, {0.0, 0.0}}, @ahead}, fn a, b, {nearest, left} ->
+      Enum.zip_reduce(line, tl(line), {{1.0e9, {0.0, 0.0}}, ahead}, fn a, b, {nearest, left} ->
         length = Pose.distance(a, b)
 
         if left <= 0.0 or length < 1.0e-6,
