@@ -40,8 +40,13 @@ defmodule Robot.Navigation.PassingPlace do
       [true, false]
   """
   @spec passes?(Grid.t(), Pose.point(), own :: float(), other :: float(), [body()]) :: boolean()
-  def passes?(grid, place, own, other, bodies \\ []),
-    do: alone?(free(grid, place, own + other + @between, other, bodies))
+  def passes?(grid, place, own, other, bodies \\ []) do
+    radius = own + other + @between
+
+    # A body that closes the way behind makes no passing place.
+    alone?(free(grid, place, radius, other, [])) and
+      (bodies == [] or alone?(free(grid, place, radius, other, bodies)))
+  end
 
   # By step of the ring, whether the other fits there.
   defp free(grid, {x, y}, radius, other, bodies) do
