@@ -17,11 +17,11 @@ defmodule Robot.Navigation.PassingPlace do
   # aside and a wall.
   @between 0.2
   @wider [0.0, 0.2, 0.4]
-  @roomy {0.35, 0.6}
+  @roomy 0.35
+  @worth 0.6
   @wall 0.1
-  # It is looked for this far away, and so much farther than the first one.
+  # It is looked for this far away (metres).
   @farthest 8.0
-  @farther 1.0
   # A place where one step of the ring less is free, so that it is less in the way, is worth so long a way.
   @step 0.015
 
@@ -33,11 +33,12 @@ defmodule Robot.Navigation.PassingPlace do
   @doc """
   Whether a robot of radius `other` gets past one of radius `own` that stands here, and past those `bodies` that stand, too.
 
-      iex> row = for i <- 0..29, into: <<>>, do: if(i in 12..17, do: <<1>>, else: <<0>>)
-      iex> corridor = for j <- 0..19, into: <<>>, do: if(j in 5..14, do: :binary.copy(<<0>>, 30), else: row)
-      iex> grid = Robot.Navigation.Grid.new(corridor, {30, 20}, 0.1, {0.0, 0.0}, closed?: false)
-      iex> for x <- [0.5, 1.5], do: Robot.Navigation.PassingPlace.passes?(grid, {x, 1.0}, 0.2, 0.29)
-      [true, false]
+      iex> wall = for i <- 0..29, into: <<>>, do: if(i in 12..17, do: <<1>>, else: <<0>>)
+      iex> cells = for j <- 0..29, into: <<>>, do: if(j in 10..19, do: <<0::240>>, else: wall)
+      iex> grid = Robot.Navigation.Grid.new(cells, {30, 30}, 0.1, {0.0, 0.0}, closed?: false)
+      iex> for place <- [{1.5, 1.5}, {0.6, 1.5}, {0.6, 2.5}],
+      ...>     do: Robot.Navigation.PassingPlace.passes?(grid, place, 0.2, 0.29)
+      [false, false, true]
   """
   @spec passes?(Grid.t(), Pose.point(), own :: float(), other :: float(), [body()]) :: boolean()
   def passes?(grid, place, own, other, bodies \\ []) do
@@ -61,62 +62,68 @@ defmodule Robot.Navigation.PassingPlace do
             Enum.all?(bodies, fn {body, r} -> Pose.distance(body, at) >= r + room end)
         end
 
-      if Enum.any?(free), do: free
+      if true in free, do: free
     end)
   end
 
   # Whether it is one stretch: it begins once, or has no end.
   defp alone?([]), do: false
 
-  defp alone?(free) do
-    begins = free |> Enum.zip(tl(free) ++ [hd(free)]) |> Enum.count(&(&1 == {false, true}))
-    begins == 1 or (begins == 0 and hd(free))
-  end
+  defp alone?([first | rest] = free),
+    do: begins(free, rest ++ [first], 0) == 1 or false not in free
+
+  defp begins([], [], count), do: count
+  defp begins([false | a], [true | b], count), do: begins(a, b, count + 1)
+  defp begins([_ | a], [_ | b], count), do: begins(a, b, count)
 
   @doc """
-  The nearest such place for a robot here, `body`, that it reaches without passing the `other`; and how far away (metres)
-  the nearest is, 0 if the robot stands in one. Where it would stand in the way of `bodies`, or they in its, is none.
+  How far a robot here, `body`, has to go to the nearest such place that it reaches without passing the `other` (metres),
+  0 if it stands in one, and that place; among those up to `farther` than the nearest, the one where it is least in the way. None
+  is where it would stand in the way of `bodies`, or they in its.
 
-      iex> row = for i <- 0..29, into: <<>>, do: if(i in 12..29, do: <<1>>, else: <<0>>)
-      iex> corridor = for j <- 0..19, into: <<>>, do: if(j in 5..14, do: :binary.copy(<<0>>, 30), else: row)
-      iex> grid = Robot.Navigation.Grid.new(corridor, {30, 20}, 0.1, {0.0, 0.0})
-      iex> {:ok, {x, _y}, metres} = Robot.Navigation.PassingPlace.nearest(grid, {{1.7, 1.0}, 0.2}, {{2.5, 1.0}, 0.2}, [])
-      iex> {x < 1.2, metres > 0.5, Robot.Navigation.PassingPlace.nearest(grid, {{2.5, 1.0}, 0.2}, {{1.7, 1.0}, 0.2}, [])}
-      {true, true, :error}
+      iex> wall = for i <- 0..29, into: <<>>, do: if(i in 12..29, do: <<1>>, else: <<0>>)
+      iex> cells = for j <- 0..29, into: <<>>, do: if(j in 10..19, do: <<0::240>>, else: wall)
+      iex> grid = Robot.Navigation.Grid.new(cells, {30, 30}, 0.1, {0.0, 0.0}, closed?: false)
+      iex> {metres, {x, _y}} = Robot.Navigation.PassingPlace.nearest(grid, {{1.7, 1.5}, 0.2}, {{2.5, 1.5}, 0.2}, [], 1.0)
+      iex> {metres > 0.5, x < 1.2}
+      {true, true}
   """
-  @spec nearest(Grid.t(), body(), other :: body(), [body()]) ::
-          {:ok, Pose.point(), metres :: float()} | :error
-  def nearest(grid, {from, own}, {other_at, other}, bodies) do
-    cell = Grid.index(grid, from)
+  @spec nearest(Grid.t(), body(), other :: body(), [body()], farther :: float()) ::
+          {metres :: float(), Pose.point()} | nil
+  def nearest(grid, {from, own}, {other_at, other}, bodies, farther \\ 0.0) do
     apart = min(own + other, Pose.distance(from, other_at) - grid.cell)
-    reach? = &(Grid.free?(grid, &1, Reach.room(own)) and Pose.distance(&1, other_at) >= apart)
+    roomy = own + other + @roomy
 
-    {roomy, worth} = @roomy
+    rules = %{
+      reach?: &(Grid.free?(grid, &1, Reach.room(own)) and Pose.distance(&1, other_at) >= apart),
+      place?: fn place ->
+        Grid.free?(grid, place, own + @wall) and
+          Enum.all?(bodies, fn {at, r} -> Pose.distance(at, place) >= r + own + @between end) and
+          passes?(grid, place, own, other, bodies)
+      end,
+      cost: fn place ->
+        free = free(grid, place, roomy, other, bodies)
+        @step * Enum.count(free, & &1) + if(alone?(free), do: 0.0, else: @worth)
+      end,
+      waves: round(farther / grid.cell)
+    }
 
-    cost = fn place ->
-      if Grid.free?(grid, place, own + @wall) and
-           Enum.all?(bodies, fn {at, r} -> Pose.distance(at, place) >= r + own + @between end) and
-           passes?(grid, place, own, other, bodies) do
-        free = free(grid, place, own + other + roomy, other, bodies)
-        @step * Enum.count(free, & &1) + if(alone?(free), do: 0.0, else: worth)
-      end
-    end
-
-    waves(grid, [cell], MapSet.new([cell]), 0, {reach?, cost}, nil)
+    cell = Grid.index(grid, from)
+    waves(grid, [cell], MapSet.new([cell]), 0, rules, nil)
   end
 
   # Wave by wave of cells; the best so far is `{cost, place, first}`, where `first` is the number of its first wave.
-  defp waves(grid, cells, seen, wave, {reach?, cost} = rules, best) do
-    last = if best, do: elem(best, 2) + round(@farther / grid.cell), else: @farthest / grid.cell
+  defp waves(grid, cells, seen, wave, rules, best) do
+    last = if best, do: elem(best, 2) + rules.waves, else: @farthest / grid.cell
 
     if cells == [] or wave > last do
-      with {_cost, place, first} <- best || :error, do: {:ok, place, first * grid.cell}
+      with {_cost, place, first} <- best, do: {first * grid.cell, place}
     else
-      best = Enum.reduce(cells, best, &better(&2, centre(grid, &1), cost, wave, grid.cell))
+      best = Enum.reduce(cells, best, &better(centre(grid, &1), &2, wave, grid.cell, rules))
 
       {next, seen} =
         for {i, j} <- cells, dx <- -1..1, dy <- -1..1, reduce: {[], seen} do
-          {next, seen} -> reached({i + dx, j + dy}, next, seen, grid, reach?)
+          {next, seen} -> reached({i + dx, j + dy}, next, seen, grid, rules.reach?)
         end
 
       waves(grid, Enum.reverse(next), seen, wave + 1, rules, best)
@@ -129,19 +136,17 @@ defmodule Robot.Navigation.PassingPlace do
       else: {next, seen}
   end
 
-  defp better(best, place, cost, wave, cell) do
-    case {cost.(place), best} do
-      {nil, best} ->
-        best
+  # Where only the nearest is asked for, the first one found is as good as others of its wave.
+  defp better(_place, {_cost, _place_so_far, _first} = best, _wave, _cell, %{waves: 0}), do: best
 
-      {cost, nil} ->
-        {cost + wave * cell, place, wave}
+  defp better(place, best, wave, cell, rules) do
+    metres = wave * cell
 
-      {cost, {least, _place, first}} when cost + wave * cell < least ->
-        {cost + wave * cell, place, first}
-
-      {_cost, best} ->
-        best
+    cond do
+      best != nil and metres >= elem(best, 0) -> best
+      not rules.place?.(place) -> best
+      best == nil -> {metres + rules.cost.(place), place, wave}
+      true -> min(best, {metres + rules.cost.(place), place, elem(best, 2)})
     end
   end
 

@@ -8,17 +8,17 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   knows the other's place only nearly, they meet again, or stand before each other: then names decide.
   """
   alias Hal.Pose
-  alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Behaviour.Avoid.{Ahead, Neighbours}
   alias Robot.Navigation.PassingPlace
   alias Robot.Percept
 
   # So far ahead on its way (metres) a robot looks for others, and so far for whom it has met.
   @ahead 5.0
   @met_ahead 9.0
-  # Bodies so near to a way (metres) are on it.
-  @beside 0.1
   # Whoever has a passing place so near (metres) gets past by keeping aside.
   @easy 0.35
+  # So much farther than the nearest place (metres) it goes for one where it is less in the way.
+  @aside 1.0
   # Whose name comes first may have so much less to go back (metres).
   @first 0.3
   # Two robots so near (metres) that have been before each other for so long, no faster than so (m/s), have judged
@@ -85,7 +85,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   def note(%__MODULE__{now: nil} = right, corners, percept, robots) do
     line = [Pose.point(percept.pose) | corners]
     near = Enum.take_while(robots, &(&1.gap < @ahead))
-    there = Enum.filter(near, &(not &1.fixed? and on?(&1, line, @ahead, percept)))
+    there = Enum.filter(near, &(not &1.fixed? and Ahead.oncoming?(&1, line, @ahead, percept)))
     right = face(right, there, percept)
 
     case Enum.find(there, &(not &1.standing? or faced?(right, &1, percept))) do
@@ -123,7 +123,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     %{
       now
       | moved_ms: if(other.standing?, do: now.moved_ms, else: at_ms),
-        on_ms: if(on?(other, line, @met_ahead, percept), do: at_ms, else: now.on_ms)
+        on_ms: if(Ahead.oncoming?(other, line, @met_ahead, percept), do: at_ms, else: now.on_ms)
     }
   end
 
@@ -135,31 +135,47 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   defp in_vain(right, id),
     do: %{right | now: nil, vain: Map.update(right.vain, id, 1, &(&1 + 1))}
 
-  defp meet(right, %{id: id} = other, line, percept, robots) do
+  defp meet(right, %{id: id} = other, line, %{grid: grid, at_ms: at_ms} = percept, robots) do
     vain = Map.get(right.vain, id, 0)
     me = {Pose.point(percept.pose), percept.profile.radius}
     it = {other.at, other.radius}
     third = for robot <- robots, robot.id != id, do: {robot.at, robot.radius}
-
-    [mine, its] =
-      for {a, b} <- [{me, it}, {it, me}], do: PassingPlace.nearest(percept.grid, a, b, third)
-
     how = if vain > 0 or faced?(right, other, percept), do: [:by_name], else: []
-    first = first({percept.robot, back(mine)}, {id, back(its)}, how)
 
-    if first == nil or vain >= @often do
-      {:go, right}
-    else
-      place = if first == id, do: elem(mine, 1)
-      at_ms = percept.at_ms
-      line = if place, do: [place | line], else: line
-      now = %{id: id, place: place, line: line, since_ms: at_ms, moved_ms: at_ms, on_ms: at_ms}
-      {if(place, do: {:wait, place}, else: :go), %{right | now: now, facing: nil}}
+    back = fn one, {_place, radius} = two ->
+      if wide?(grid, one, radius),
+        do: 0.0,
+        else: metres(PassingPlace.nearest(grid, one, two, third))
+    end
+
+    first =
+      if vain < @often and not (wide?(grid, me, other.radius) and wide?(grid, it, elem(me, 1))),
+        do: first({percept.robot, back.(me, it)}, {id, back.(it, me)}, how)
+
+    place =
+      with ^id <- first,
+           {_metres, place} <- PassingPlace.nearest(grid, me, it, third, @aside),
+           do: place,
+           else: (_none -> nil)
+
+    now = %{id: id, place: place, line: line, since_ms: at_ms, moved_ms: at_ms, on_ms: at_ms}
+
+    cond do
+      place != nil ->
+        {{:wait, place}, %{right | now: %{now | line: [place | line]}, facing: nil}}
+
+      first == percept.robot ->
+        {:go, %{right | now: now, facing: nil}}
+
+      true ->
+        {:go, right}
     end
   end
 
-  defp back({:ok, _place, metres}), do: metres
-  defp back(:error), do: nil
+  defp wide?(grid, {at, own}, other), do: PassingPlace.passes?(grid, at, own, other)
+
+  defp metres({metres, _place}), do: metres
+  defp metres(nil), do: nil
 
   # Before whom it has been for a while.
   defp face(right, there, %{at_ms: at_ms}) do
@@ -176,33 +192,4 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     do: at_ms - since_ms >= @facing_ms
 
   defp faced?(_right, _other, _percept), do: false
-
-  # Whether it is on the line, and stands there or drives against its direction.
-  defp on?(%{velocity: {vx, vy}} = other, line, ahead, percept) do
-    {distance, {ux, uy}} = nearest(line, other.at, ahead)
-    speed = :math.sqrt(vx * vx + vy * vy)
-
-    distance < percept.profile.radius + other.radius + @beside and
-      (other.standing? or vx * ux + vy * uy < -0.3 * speed)
-  end
-
-  # How near the first metres of a line come to a point, and the line's direction there.
-  defp nearest(line, at, ahead) do
-    {nearest, _left} =
-      Enum.zip_reduce(line, tl(line), {{1.0e9, {0.0, 0.0}}, ahead}, fn a, b, {nearest, left} ->
-        length = Pose.distance(a, b)
-
-        if left <= 0.0 or length < 1.0e-6,
-          do: {nearest, left},
-          else: {min(nearest, near(a, b, length, min(left, length), at)), left - length}
-      end)
-
-    nearest
-  end
-
-  defp near({ax, ay}, {bx, by}, length, end_m, {x, y}) do
-    {ux, uy} = {(bx - ax) / length, (by - ay) / length}
-    along = ((x - ax) * ux + (y - ay) * uy) |> max(0.0) |> min(end_m)
-    {Pose.distance({ax + along * ux, ay + along * uy}, {x, y}), {ux, uy}}
-  end
 end
