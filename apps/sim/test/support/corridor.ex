@@ -60,7 +60,9 @@ defmodule Sim.Corridor do
     go(trial, ids, limit_s * 1000, %{}, 99.0)
   end
 
-  defp setup(map, plan, seed, robots) do
+  @doc "The start of such a run."
+  @spec setup(Sim.Floorplan.t(), Sim.Floorplan.t() | :sonar, integer(), [tuple()]) :: Setup.t()
+  def setup(map, plan, seed, robots) do
     ids = for {id, _from, _goal} <- robots, do: id
     options = %{robots: ids, map: "doorway", seed: seed, landmark: :none, blobs: :direct}
     kind = if plan == :sonar, do: :sonar, else: :known

@@ -254,13 +254,13 @@ defmodule Robot.Behaviour.Avoid do
 
   defp tell(inner, nil, _percept), do: inner
 
-  # What sonars have seen is doubtful, and forgotten in time: only a floor plan proves that no way leads there.
-  defp tell(inner, %{way?: false}, %{grid: %{closed?: true}} = percept),
-    do: Robot.Behaviour.routed(inner, :no_way, percept)
-
   defp tell(inner, way, percept) do
-    left = Avoid.Route.left(way, Pose.point(percept.pose))
-    Robot.Behaviour.routed(inner, {:left, left}, percept)
+    if Avoid.Route.none?(way, percept) do
+      Robot.Behaviour.routed(inner, :no_way, percept)
+    else
+      left = Avoid.Route.left(way, Pose.point(percept.pose))
+      Robot.Behaviour.routed(inner, {:left, left}, percept)
+    end
   end
 
   defp twist(wish, velocity, preferred, percept, backing?) do
