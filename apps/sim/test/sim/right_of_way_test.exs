@@ -51,6 +51,14 @@ defmodule Sim.RightOfWayTest do
   test "two that meet in a corridor for one both arrive", do: all_arrive(hd(@cases), [1])
   test "three that meet in a door all arrive", do: all_arrive(List.last(@cases), [1])
 
+  test "a robot whose sonars have seen walls all round gives up in words, before its patience ends" do
+    wall = [{:wall, {:box, -0.1, -2.5, 0.1, 2.5}}]
+    robots = Corridor.robots([mag1: :left], 0.1, 3)
+    run = Corridor.run(Corridor.map(1.1, 0.2, wall), :sonar, 3, robots, 60)
+    assert %{mag1: {:given_up, "no way", at_s}} = run.ended
+    assert at_s < 40
+  end
+
   @tag long: true
   @tag timeout: 600_000
   test "all arrive, by ten seeds" do

@@ -212,8 +212,10 @@ defmodule Robot.Behaviour.Avoid do
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
 
-    # Whoever goes on, or back, past another gives it time.
-    left = if way && state.right.now == nil, do: Avoid.Route.left(way, Pose.point(percept.pose))
+    left =
+      if way && not RightOfWay.near?(state.right, robots),
+        do: Avoid.Route.left(way, Pose.point(percept.pose))
+
     {aside, progress} = Progress.note(state.progress, left, percept.robot, percept.at_ms)
 
     preferred =

@@ -119,6 +119,13 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     end
   end
 
+  @doc "Whether one of these is near whom it meets, and who needs time."
+  @spec near?(t(), [Neighbours.t()]) :: boolean()
+  def near?(%__MODULE__{now: nil}, _robots), do: false
+
+  def near?(%__MODULE__{now: %{id: id}}, robots),
+    do: Enum.any?(robots, &(&1.id == id and &1.gap < @facing))
+
   defp seen(now, other, line, %{at_ms: at_ms} = percept) do
     %{
       now
