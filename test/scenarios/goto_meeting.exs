@@ -14,8 +14,8 @@
     {30, {:tell, :mag1, "goto:6:1"}}
   ],
   expect: [
-    {:at, :mag1, {6, 1}, within_m: 0.4, by_s: 90},
-    {:at, :mag2, {-2, 0}, within_m: 0.4, by_s: 90},
+    {:at, :mag1, {6, 1}, within_m: 0.6, by_s: 90},
+    {:at, :mag2, {-2, 0}, within_m: 0.6, by_s: 90},
     {:no_collision}
   ]
 ]
