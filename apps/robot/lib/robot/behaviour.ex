@@ -23,8 +23,8 @@ defmodule Robot.Behaviour do
   @doc "The running behaviour with some options changed, such as a target that moves every tick."
   @callback update(keyword(), state :: term()) :: t()
 
-  @typedoc "What is left of the way to a goal (metres), or that walls leave none."
-  @type route :: {:left, float()} | :no_way
+  @typedoc "What is left of the way to a goal (metres), that walls leave none, or that the robot lets another pass first."
+  @type route :: {:left, float()} | :no_way | :waits
 
   @doc """
   Told at each tick, after `c:tick/2`, of the way to the goal that the behaviour wished for (`Robot.Behaviour.Avoid`).

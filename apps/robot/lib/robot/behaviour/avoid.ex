@@ -29,15 +29,17 @@ defmodule Robot.Behaviour.Avoid do
     GiveWay,
     Neighbours,
     Preference,
-    Progress
+    Progress,
+    RightOfWay
   }
 
   # A robot this near (metres) to the place beside an occupied goal has arrived.
   @beside 0.08
   # An echo so near to a wall of the floor plan (metres) may be that wall's, seen in the wide cone of a sonar.
   @wall 0.3
-  # The speed (m/s) of a robot that makes way.
+  # The speed (m/s) of a robot that makes way, and of one that goes back to a passing place.
   @aside 0.2
+  @back 0.4
 
   @impl Robot.Behaviour
   def new(options) do
@@ -57,6 +59,7 @@ defmodule Robot.Behaviour.Avoid do
       backing?: false,
       velocity: nil,
       yield: nil,
+      right: %RightOfWay{},
       echoes: if(unmapped?, do: %Echoes{})
     }
 
@@ -136,10 +139,41 @@ defmodule Robot.Behaviour.Avoid do
   defp bend(wish, speed, percept, state) do
     all = Neighbours.robots(percept)
 
-    case Avoid.Route.taken(wish.goal, percept, all, state.discs) do
-      nil -> bend_round(wish, speed, percept, all, state)
-      near -> beside(wish, near, speed, percept, all, state)
+    case right_of_way(wish, percept, all, state) do
+      {{:wait, place}, state} ->
+        give_way(wish, place, min(speed, @back), percept, all, state)
+
+      {:go, state} ->
+        case Avoid.Route.taken(wish.goal, percept, all, state.discs) do
+          nil -> bend_round(wish, speed, percept, all, state)
+          near -> beside(wish, near, speed, percept, all, state)
+        end
     end
+  end
+
+  defp right_of_way(%{goal: nil}, _percept, _all, state), do: {:go, state}
+
+  defp right_of_way(_wish, percept, all, state) do
+    corners = if state.way, do: state.way.corners, else: []
+    {what, right} = RightOfWay.note(state.right, corners, percept, all)
+    {what, %{state | right: right}}
+  end
+
+  # It goes to a place where another gets past, and stands there; its goal can wait.
+  defp give_way(wish, place, speed, percept, all, state) do
+    waiting = Robot.Behaviour.routed(state.inner, :waits, percept)
+    near = if state.velocity == nil, do: 2 * @beside, else: @beside
+
+    {wish, state} =
+      if Pose.distance(percept.pose, place) < near do
+        wish = %{wish | twist: Twist.zero(), velocity: {0.0, 0.0}}
+        {wish, %{state | progress: nil, velocity: nil, way: nil}}
+      else
+        wish = %{toward(wish, place, speed, percept) | reverse?: true}
+        bend_round(wish, speed, percept, all, state)
+      end
+
+    {%{wish | by: :give_way}, %{state | inner: waiting}}
   end
 
   # The goal is occupied, so the nearest place beside it becomes the goal.
@@ -153,13 +187,17 @@ defmodule Robot.Behaviour.Avoid do
       wish = %{wish | by: :blocked, twist: Twist.zero(), velocity: {0.0, 0.0}}
       {wish, %{state | inner: inner, blocked?: true, progress: nil, velocity: nil, way: nil}}
     else
-      {x, y} = near
-      speed = min(speed, Steering.approach(distance, percept.profile)) / distance
-      velocity = {speed * (x - percept.pose.x), speed * (y - percept.pose.y)}
-      twist = Steering.twist(velocity, percept.pose.heading, percept.profile)
-      wish = %{wish | goal: near, velocity: velocity, twist: twist, reverse?: false}
-      bend_round(wish, speed * distance, percept, all, %{state | blocked?: false})
+      speed = min(speed, Steering.approach(distance, percept.profile))
+      wish = %{toward(wish, near, speed, percept) | reverse?: false}
+      bend_round(wish, speed, percept, all, %{state | blocked?: false})
     end
+  end
+
+  defp toward(wish, {x, y} = place, speed, percept) do
+    share = speed / Pose.distance(percept.pose, place)
+    velocity = {share * (x - percept.pose.x), share * (y - percept.pose.y)}
+    twist = Steering.twist(velocity, percept.pose.heading, percept.profile)
+    %{wish | goal: place, velocity: velocity, twist: twist}
   end
 
   defp bend_round(wish, speed, percept, all, state) do
@@ -174,13 +212,11 @@ defmodule Robot.Behaviour.Avoid do
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)
     corners = way && way.corners
 
-    {aside, progress} =
-      Progress.note(
-        state.progress,
-        way && Avoid.Route.left(way, Pose.point(percept.pose)),
-        percept.robot,
-        percept.at_ms
-      )
+    left =
+      if way && not RightOfWay.near?(state.right, robots),
+        do: Avoid.Route.left(way, Pose.point(percept.pose))
+
+    {aside, progress} = Progress.note(state.progress, left, percept.robot, percept.at_ms)
 
     preferred =
       wish.velocity
@@ -220,13 +256,13 @@ defmodule Robot.Behaviour.Avoid do
 
   defp tell(inner, nil, _percept), do: inner
 
-  # What sonars have seen is doubtful, and forgotten in time: only a floor plan proves that no way leads there.
-  defp tell(inner, %{way?: false}, %{grid: %{closed?: true}} = percept),
-    do: Robot.Behaviour.routed(inner, :no_way, percept)
-
   defp tell(inner, way, percept) do
-    left = Avoid.Route.left(way, Pose.point(percept.pose))
-    Robot.Behaviour.routed(inner, {:left, left}, percept)
+    if Avoid.Route.none?(way, percept) do
+      Robot.Behaviour.routed(inner, :no_way, percept)
+    else
+      left = Avoid.Route.left(way, Pose.point(percept.pose))
+      Robot.Behaviour.routed(inner, {:left, left}, percept)
+    end
   end
 
   defp twist(wish, velocity, preferred, percept, backing?) do

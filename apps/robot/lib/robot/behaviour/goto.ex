@@ -19,6 +19,8 @@ defmodule Robot.Behaviour.Goto do
 
   @points_there 0.09
   @points_aside 0.26
+  # So many ticks, three minutes, it lets others pass before its patience counts again.
+  @waits 1_800
 
   @impl Robot.Behaviour
   def new(options) do
@@ -35,6 +37,7 @@ defmodule Robot.Behaviour.Goto do
      Enum.into(Options.check!(options, table, "goto"), %{
        mode: :turning,
        patience: nil,
+       waited: 0,
        way?: true
      })}
   end
@@ -67,7 +70,12 @@ defmodule Robot.Behaviour.Goto do
   defp wait(state, %{at_ms: at_ms}),
     do: %{state | patience: Patience.wait(state.patience, at_ms)}
 
+  # It lets another pass, which is no failure of its own, but not for ever.
   @impl Robot.Behaviour
+  def routed(:waits, _percept, %{waited: waited} = state) when waited < @waits,
+    do: {__MODULE__, %{state | patience: nil, waited: waited + 1}}
+
+  def routed(:waits, _percept, state), do: {__MODULE__, state}
   def routed(:no_way, _percept, state), do: {__MODULE__, %{state | way?: false}}
 
   def routed({:left, metres}, %{at_ms: at_ms}, state),

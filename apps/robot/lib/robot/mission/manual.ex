@@ -8,7 +8,8 @@ defmodule Robot.Mission.Manual do
   that it follows, so that a command that would close a circle of followers can be refused.
 
   Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
-  (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why. One that ends
+  (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why; from a door, or
+  where nobody gets past it, it goes aside (`Robot.Navigation.PassingPlace`). One that ends
   where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
@@ -19,12 +20,14 @@ defmodule Robot.Mission.Manual do
   alias Hal.{Pose, Twist}
   alias Robot.{Command, Percept}
   alias Robot.Behaviour.Blocker
-  alias Robot.Navigation.{Grid, Reach}
+  alias Robot.Navigation.{Grid, PassingPlace, Reach}
 
   @behaviour Robot.Mission
 
   @behind 1.0
   @silent_ms 1_000
+  # A robot that gives up goes so much farther than it must (metres) for a place where it is less in the way.
+  @aside 1.0
   # It has not surely arrived at a place if it may be this far from there (metres).
   @unsure 0.5
 
@@ -67,7 +70,7 @@ defmodule Robot.Mission.Manual do
     why = blocker(failed, percept, {x, y})
     gone = {:stage, :given_up, %{x: x, y: y, blocked_by: why}}
     claim = {:claim, %{phase: :idle, standing: true, blocked_by: why}}
-    result(%{mission | why: why}, [gone, claim])
+    result(%{mission | why: why}, [gone, claim | aside(percept, {x, y}, mission.count)])
   end
 
   def handle(
@@ -105,6 +108,20 @@ defmodule Robot.Mission.Manual do
        do: {:given_up, mission, effects}
 
   defp result(mission, effects), do: {:done, mission, effects}
+
+  # It does not stay in a door, or in another place where nobody gets past.
+  defp aside(%{grid: nil}, _goal, _count), do: []
+
+  defp aside(%{grid: grid, pose: pose, profile: %{radius: radius}}, goal, count) do
+    at = Pose.point(pose)
+
+    with false <- PassingPlace.passes?(grid, at, radius, radius),
+         {_metres, {x, y}} <- PassingPlace.nearest(grid, {at, radius}, {goal, radius}, [], @aside) do
+      [{:goal, {:aside, count}, {Robot.Behaviour.Goto, x: x, y: y}}]
+    else
+      _passes_or_none -> []
+    end
+  end
 
   # Walls first, then what stands on the first stretch of the way round them.
   defp blocker(failed, %{grid: grid, pose: pose, profile: profile} = percept, goal) do

@@ -52,6 +52,20 @@ defmodule Robot.Behaviour.GotoTest do
     assert body.at_ms - begun <= 1_000
   end
 
+  test "walls that sonars have seen end it when they have had no gap for 5 s, and within 2 s of that" do
+    seen =
+      &fn percept ->
+        %{percept | grid: %{grid(&1) | closed?: false}, pose: Pose.new(1.0, 2.0)}
+      end
+
+    {nil, body} = {5.0, 2.0} |> sent() |> Body.run(10, seen.(10..20))
+    # Somebody passes the door; and a gap that is too narrow is one, as sonars draw doors.
+    {nil, body} = Body.run(body, 30, seen.(:closed))
+    {nil, body} = Body.run(body, 30, seen.(18..21))
+    assert {{1, 0}, ended} = Body.run(body, 75, seen.(:closed))
+    assert (ended.at_ms - body.at_ms) in 5_000..7_000
+  end
+
   test "what stands in the only door ends it after 15 s without progress, with or without a plan" do
     for grid <- [grid(17..23), nil] do
       # A body that fills the door.

@@ -108,6 +108,34 @@ defmodule Robot.Mission.ManualTest do
     end
   end
 
+  test "a robot that gives up where nobody gets past goes aside, and says no other word" do
+    # A room of 2 m, and a corridor of 0.8 m.
+    cells =
+      for j <- 0..19,
+          i <- 0..49,
+          into: <<>>,
+          do: if(i > 20 and j not in 6..13, do: <<1>>, else: <<0>>)
+
+    grid = Robot.Navigation.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
+
+    for {x, aside?} <- [{0.6, false}, {3.0, true}] do
+      {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:4.5:1.0")
+      {:given_up, mission, _claim} = Manual.handle({:outcome, tag, 2}, mission)
+      percept = %{percept(100, %{}) | pose: Pose.new(x, 1.0), grid: grid}
+
+      assert {:given_up, mission, [_stage, _claim | more]} =
+               Manual.handle({:tick, percept}, mission)
+
+      if aside? do
+        assert [{:goal, aside, {Robot.Behaviour.Goto, x: to, y: _y}}] = more
+        assert to < 2.0
+        assert {:given_up, ^mission, []} = Manual.handle({:outcome, aside, 1}, mission)
+      else
+        assert more == []
+      end
+    end
+  end
+
   test "a wall where a robot was sent is named" do
     cells =
       for j <- 0..9, i <- 0..29, into: <<>>, do: if(i > 20 and j < 5, do: <<1>>, else: <<0>>)

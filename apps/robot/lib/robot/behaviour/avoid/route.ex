@@ -10,18 +10,19 @@ defmodule Robot.Behaviour.Avoid.Route do
   alias Robot.Behaviour.Avoid.Neighbours
 
   @enforce_keys [:corners, :goal, :at_ms]
-  defstruct @enforce_keys ++ [way?: true, rough?: false]
+  defstruct @enforce_keys ++ [way?: true, rough?: false, shut_ms: nil]
 
   @typedoc """
   `way?` is `false` if walls leave no way, whatever else stands about; this route ignores them then. `rough?`: a wall is on it as it was found, because the
-  robot or its goal is too near to one.
+  robot or its goal is too near to one. `shut_ms` is since when the walls have had no gap, however narrow.
   """
   @type t :: %__MODULE__{
           corners: [Pose.point(), ...],
           goal: Pose.point(),
           at_ms: integer(),
           way?: boolean(),
-          rough?: boolean()
+          rough?: boolean(),
+          shut_ms: integer() | nil
         }
 
   # Clearance between the bodies (metres): the preferred one, the fallback, and the least one.
@@ -41,6 +42,10 @@ defmodule Robot.Behaviour.Avoid.Route do
   # there is one so wide.
   @by_wall 0.03
   @from_wall 0.08
+  # Sonars draw a door narrower than it is, but leave a gap of this radius (metres); and who stands in one for so long is a
+  # wall.
+  @gap 0.05
+  @shut_ms 5_000
 
   @doc """
   The place at which to stand if a body that will not move occupies the goal (a dead or holding
@@ -98,11 +103,16 @@ defmodule Robot.Behaviour.Avoid.Route do
         goal: goal,
         at_ms: percept.at_ms,
         way?: corners != nil,
-        rough?: corners == nil or not no_wall?(corners, from, percept)
+        rough?: corners == nil or not no_wall?(corners, from, percept),
+        shut_ms: if(corners == nil, do: shut_ms(kept, from, goal, percept))
       }
 
       better(kept, new, from)
     end
+  end
+
+  defp shut_ms(kept, from, goal, %{grid: grid, at_ms: at_ms}) do
+    if Grid.Way.find(grid, from, goal, @gap) == nil, do: (kept && kept.shut_ms) || at_ms
   end
 
   defp again_ms(%{way?: way?}), do: if(way?, do: @again_ms, else: @walled_ms)
@@ -148,6 +158,17 @@ defmodule Robot.Behaviour.Avoid.Route do
   defp better(kept, new, from) do
     if left(kept, from) > left(new, from) + @better, do: new, else: %{kept | at_ms: new.at_ms}
   end
+
+  @doc """
+  Whether it is known that no way leads to its goal. A floor plan proves it. What sonars have seen is doubtful, and forgotten
+  in time: it must leave no gap, and have done so for longer than somebody takes who passes a door.
+  """
+  @spec none?(t(), Percept.t()) :: boolean()
+  def none?(%__MODULE__{way?: true}, _percept), do: false
+  def none?(_route, %{grid: %{closed?: true}}), do: true
+
+  def none?(%__MODULE__{shut_ms: shut_ms}, %{at_ms: at_ms}),
+    do: shut_ms != nil and at_ms - shut_ms >= @shut_ms
 
   @doc "The length of the route from a place (metres)."
   @spec left(t(), Pose.point()) :: float()
