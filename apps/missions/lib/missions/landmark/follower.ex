@@ -188,14 +188,14 @@ defmodule Missions.Landmark.Follower do
   defp unsure_ms(%{unsure?: true, unsure_ms: nil}, _error, now), do: now
   defp unsure_ms(follower, _error, _now), do: follower.unsure_ms
 
-  # What no known wall hides of the leader, the landmark, and the robots ahead.
+  # What no wall hides of the leader, the landmark, and the robots ahead. Who does not know walls takes one robot for another.
   defp visible(%{anchor: anchor, percept: %{grid: grid} = percept} = mission, leader) do
     ahead = for id <- Enum.take_while(anchor.order, &(&1 != mission.me)), do: percept.peers[id]
     robots = for %{pose: pose} <- ahead, do: Pose.point(pose)
     from = Pose.point(percept.pose)
 
     for at <- [Pose.point(leader), SlotPoses.landmark(anchor) | robots],
-        at != nil and (grid == nil or Grid.free_line?(grid, from, at, 0.0)),
+        at != nil and grid != nil and Grid.free_line?(grid, from, at, 0.0),
         do: at
   end
 

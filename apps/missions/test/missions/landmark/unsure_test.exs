@@ -4,6 +4,7 @@ defmodule Missions.Landmark.UnsureTest do
   """
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Robot.Navigation.Grid
   alias Robot.Percept
   alias Swarm.EStop
   alias Missions.Landmark.Reference
@@ -25,10 +26,11 @@ defmodule Missions.Landmark.UnsureTest do
   end
 
   # A follower that is never moved, `off` metres from its slot, for `seconds`; it is in its leader's frame.
-  defp stand(off, radius, seconds), do: watch(fn _seconds -> off end, radius, seconds)
+  defp stand(off, radius, seconds, grid \\ nil),
+    do: watch(fn _seconds -> off end, radius, seconds, grid)
 
   # The same of one that comes nearer by its own estimate: `off` is a function of the seconds.
-  defp watch(off, radius, seconds) do
+  defp watch(off, radius, seconds, grid \\ nil) do
     mission = mission(phase: :follow, leader: :mag1, epoch: 1, follower: Follower.new())
 
     uncertainty = %{
@@ -55,18 +57,27 @@ defmodule Missions.Landmark.UnsureTest do
         still: true
       }
 
-      percept = percept(at_ms: now, uncertainty: uncertainty)
+      percept = percept(at_ms: now, uncertainty: uncertainty, grid: grid)
       mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
       {mission, _effects} = Follower.act(mission)
       mission
     end).follower
   end
 
-  test "one that stays unsure turns to its leader, and one that is sure does not" do
-    assert stand(0.1, 0.62, 3).facing == nil
-    assert {_slot, heading} = stand(0.1, 0.62, 5).facing
+  # 4 x 4 m about the robot, with a wall across it at this x, if any.
+  defp room(wall) do
+    cells = for _j <- 0..39, i <- 0..39, into: <<>>, do: if(i == wall, do: <<1>>, else: <<0>>)
+    Grid.new(cells, {40, 40}, 0.1, {-2.0, -2.0})
+  end
+
+  test "one that stays unsure turns to its leader if no wall is between, and one that is sure does not" do
+    assert stand(0.1, 0.62, 3, room(nil)).facing == nil
+    assert {_slot, heading} = stand(0.1, 0.62, 5, room(nil)).facing
     assert_in_delta heading, 0.0, 1.0e-6
-    assert stand(0.1, 0.3, 5).facing == nil
+    assert stand(0.1, 0.3, 5, room(nil)).facing == nil
+    assert stand(0.1, 0.62, 5, room(25)).facing == nil
+    # Without walls it would not know whom they hide.
+    assert stand(0.1, 0.62, 5).facing == nil
   end
 
   test "it reports unsure, and neither in place nor blocked" do
