@@ -24,6 +24,8 @@ defmodule Missions.Landmark.Follower do
   @slow 0.05
   # A robot that is unsure for this long turns; a slot that moved by less (metres) is the same one.
   @unsure_ms 4_000
+  # A line of sight is a disc of this radius (metres), less than the clearance of any free cell.
+  @ray 0.01
   @same_slot 0.2
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
@@ -195,7 +197,7 @@ defmodule Missions.Landmark.Follower do
     from = Pose.point(percept.pose)
 
     for at <- [Pose.point(leader), SlotPoses.landmark(anchor) | robots],
-        at != nil and grid != nil and Grid.free_line?(grid, from, at, 0.0),
+        at != nil and grid != nil and Grid.free_line?(grid, from, at, @ray),
         do: at
   end
 
