@@ -20,6 +20,9 @@ defmodule Robot.Localiser do
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
   @put_down 0.1
+  # The frame of a leader is that of the plan if its pose is as sure as this (m2, rad2).
+  @planned 0.15 * 0.15
+  @aligned 0.06 * 0.06
   # A robot that was started again on its way has found its place when it knows it by this (m).
   @found_radius 1.0
 
@@ -119,7 +122,7 @@ defmodule Robot.Localiser do
       |> Frame.joined(frame.at, position, heading)
       |> Frame.led(frame.slip)
 
-    renumber(%{localiser | frame: frame, belief: belief})
+    renumber(%{localiser | frame: frame, belief: belief, walls: %Walls{}})
   end
 
   # The uncertainty between two frames: one may be the base of the other, or both derive from the
@@ -251,13 +254,20 @@ defmodule Robot.Localiser do
     end
   end
 
-  # A plan is in the frame of the start poses.
-  defp hear(%{frame: nil, anchors: %{walls?: true}} = localiser, percept) do
-    {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
-    %{localiser | walls: walls, belief: belief}
+  # A plan is in the frame of the start poses, and in that of a leader that knows where it is in there.
+  defp hear(%{anchors: %{walls?: true}} = localiser, percept) do
+    if planned?(localiser.frame) do
+      {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
+      %{localiser | walls: walls, belief: belief}
+    else
+      %{localiser | walls: %Walls{}}
+    end
   end
 
   defp hear(localiser, _percept), do: %{localiser | walls: %Walls{}}
+
+  defp planned?(nil), do: true
+  defp planned?(%{start: {position, heading}}), do: position <= @planned and heading <= @aligned
 
   # A robot that was never led: nobody knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do

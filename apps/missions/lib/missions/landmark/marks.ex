@@ -55,7 +55,7 @@ defmodule Missions.Landmark.Marks do
       end
 
     marks = landmark(mission) ++ robots
-    %Anchors{frame: frame(mission, leader), marks: marks, walls?: false}
+    %Anchors{frame: frame(mission, leader), marks: marks}
   end
 
   defp neighbours(%{peers: peers}, _ahead) when map_size(peers) <= @nearest, do: peers

@@ -9,8 +9,8 @@ defmodule Robot.Localiser.Anchors do
   in before (`base`), and from then on what the leader's odometry adds.
 
   `standing` is the colour of a standing object whose place is unknown (`Robot.Localiser.TurnCheck`). `walls?` tells whether the
-  walls of a floor plan may correct the pose, too (`Robot.Localiser.Walls`): not where robots take their places from each
-  other, because a correction of one would have to move them all.
+  walls of a floor plan may correct the pose, too (`Robot.Localiser.Walls`), in a leader's frame only while that leader knows its own
+  place by the plan: not that of a leader itself, because a correction of it would have to move them all.
   """
   alias Hal.Pose
 

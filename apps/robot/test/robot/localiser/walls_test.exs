@@ -71,6 +71,31 @@ defmodule Robot.Localiser.WallsTest do
     end
   end
 
+  test "corrects a follower of a leader that knows its place by the plan, and of no other" do
+    track = drive(2)
+
+    frame = fn sd ->
+      zeros = %{base: nil, at: {1.0, 2.0}, drift: {0.0, 0.0, 0.0}, slip: 0.0}
+      sure = %{position: sd * sd, heading: 1.0e-4, start: {sd * sd, 1.0e-4}}
+      Map.merge(zeros, Map.put(sure, :key, {:mag1, 1, 1}))
+    end
+
+    [near, far] =
+      for sd <- [0.05, 0.4] do
+        {_first, localiser} =
+          Localiser.update(
+            Localiser.new(@start),
+            Room.percept(@size, @start, Pose.new(0, 0), 0, nil)
+          )
+
+        localiser = Localiser.anchors(localiser, %Anchors{frame: frame.(sd)})
+        track |> follow(Room.plan(@size), localiser) |> elem(0)
+      end
+
+    assert near < 0.2
+    assert far > 0.5
+  end
+
   test "corrects nothing where robots take their places from each other" do
     track = drive(1)
     localiser = Localiser.anchors(Localiser.new(@start), %Anchors{walls?: false})
