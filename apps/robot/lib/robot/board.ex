@@ -19,7 +19,7 @@ defmodule Robot.Board do
   | `:followed` | `:estop` | the last of the `:presses` that it has made a stop of |
   | `:radio` | `:comms` | counts of messages sent, received, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
-  | `:presses` | `:gate` | how often its own button was pressed |
+  | `:presses` | `:gate` | how often it was stopped directly (`Robot.Safety.Gate.presses/1`) |
   | `:frame` | `:gate` | the odometry frame of the fence: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | the chosen wish and the outcome of the goal (3) |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
