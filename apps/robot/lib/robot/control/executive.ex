@@ -8,7 +8,8 @@ defmodule Robot.Control.Executive do
   kills it.
 
   A goal is for now: while the wheels may not turn it is refused (`Robot.Safety.Readiness`), and when
-  they are disarmed, by whatever, it is dropped, so that arming starts nothing.
+  they are disarmed, by whatever, it is dropped, so that arming starts nothing. An executive that is held (`hold/1`) refuses
+  goals while a mission is being ended; a robot that is held is one that an e-stop holds (`docs/glossary.md`).
 
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
