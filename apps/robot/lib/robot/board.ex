@@ -35,9 +35,9 @@ defmodule Robot.Board do
     1. As its one owner publishes it: the tags of the stops that hold the robot, those that were
        cleared here, and the calls heard.
     2. By any kind of stop: `System.monotonic_time/1`, microseconds.
-    3. `%{by: behaviour, weights: [{behaviour, weight}], way: [{x, y}], outcome: {tag, integer} or
-       nil, fault: line or nil, tick: count}`; all that wished, and the corners of the way to its
-       goal (`Robot.Control.Controller`)
+    3. `%{by: behaviour, weights: [{behaviour, weight}], way: [{x, y}], limits: [atom], outcome:
+       {tag, integer} or nil, fault: line or nil, tick: count}`; all that wished, the corners of the
+       way to its goal, and what slows it down before the gate (`Robot.Control.Controller`)
     4. `{:silent, module}`, with the behaviour or the mission in which it hangs (`nil` for the
        gate); `{:hung, module}` once it was killed for that.
     5. `{module, integer}`, with another number for each call.

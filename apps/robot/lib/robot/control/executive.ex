@@ -96,7 +96,7 @@ defmodule Robot.Control.Executive do
     Gate.forget(id)
     board = Board.find!(id)
     at_ms = Robot.Config.now(config)
-    doing = %{by: :idle, weights: [], way: [], outcome: nil, fault: nil, tick: 0}
+    doing = %{by: :idle, weights: [], way: [], limits: [], outcome: nil, fault: nil, tick: 0}
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
@@ -231,6 +231,7 @@ defmodule Robot.Control.Executive do
       by: wish.by,
       weights: Controller.weights(controller),
       way: Controller.way(controller),
+      limits: Controller.limits(controller),
       outcome: outcome,
       fault: fault,
       tick: s.tick + 1
