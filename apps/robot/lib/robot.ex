@@ -3,7 +3,7 @@ defmodule Robot do
   Runs one robot: what it perceives, wishes and may do, ten times a second.
 
   A tick is a function (`Robot.Control.Controller`): from a percept (`Robot.Percept`) behaviours make wishes
-  (`Robot.Behaviour`), the arbiter chooses one, and the gate has the last word (`Robot.Safety.Reflex`). What a robot does over
+  (`Robot.Behaviour`), the arbiter chooses one, and the gate limits it (`Robot.Safety.Reflex`). What a robot does over
   minutes is a mission (`Robot.Mission`).
 
   Of two wishes the heavier one wins, and the one that won last counts a tenth more:

@@ -167,7 +167,7 @@ const length = (way) => way.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot
 // Without the minus of -0.00.
 const decimals = (number) => (Math.round(number * 100) / 100 + 0).toFixed(2);
 
-// Why it does what it does: who wished, the chosen one first, what the gate limits, its way, its devices, and what it did.
+// Why it does what it does: who wished, the chosen one first, what limits it, its way, its devices, and what it did.
 function about(told) {
   if (told.id !== chosen) return;
   floor.about = told;

@@ -19,7 +19,7 @@ defmodule Robot.Board do
   | `:followed` | `:estop` | the last of the `:presses` that it has made a stop of |
   | `:radio` | `:comms` | counts of messages sent, received, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
-  | `:presses` | `:gate` | how often its own button was pressed |
+  | `:presses` | `:gate` | how often it was stopped directly (`Robot.Safety.Gate.presses/1`) |
   | `:frame` | `:gate` | the odometry frame of the fence: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | the chosen wish and the outcome of the goal (3) |
   | `:goal` | `:executive` | the module of its goal's behaviour, or `nil` |
@@ -35,9 +35,9 @@ defmodule Robot.Board do
     1. As its one owner publishes it: the tags of the stops that hold the robot, those that were
        cleared here, and the calls heard.
     2. By any kind of stop: `System.monotonic_time/1`, microseconds.
-    3. `%{by: behaviour, weights: [{behaviour, weight}], way: [{x, y}], outcome: {tag, integer} or
-       nil, fault: line or nil, tick: count}`; all that wished, and the corners of the way to its
-       goal (`Robot.Control.Controller`)
+    3. `%{by: behaviour, weights: [{behaviour, weight}], way: [{x, y}], limits: [atom], outcome:
+       {tag, integer} or nil, fault: line or nil, tick: count}`; all that wished, the corners of the
+       way to its goal, and what slows it down before the gate (`Robot.Control.Controller`)
     4. `{:silent, module}`, with the behaviour or the mission in which it hangs (`nil` for the
        gate); `{:hung, module}` once it was killed for that.
     5. `{module, integer}`, with another number for each call.

@@ -18,8 +18,8 @@ defmodule Robot.Config do
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; messages of the mission go to `apply(m, f, a ++ [to, message])`;
       `nil` drops them
-    * `:on_latch` - `{m, f, a}`, applied by the gate when it has set or cleared its e-stop latch
-      by a button of its own, or `nil`
+    * `:on_latch` - `{m, f, a}`, applied by the gate when its e-stop latch was set or cleared
+      directly (`Robot.Safety.Gate.estop/2`), or `nil`
     * `:clock` - `{m, f, a}` that returns integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
       they are sent `:step` and `:tick`, so that a test determines the order

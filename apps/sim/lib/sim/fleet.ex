@@ -183,7 +183,7 @@ defmodule Sim.Fleet do
     claims = ask(s, :claims)
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
-    {told, said} = Said.look(s.said, claims)
+    {told, said} = Said.look(s.said, claims, s.run_log.roles)
     run_log = s.run_log |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
     run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
     {events, script} = Script.due(s.script, now(s), RunLog.leader(run_log))
@@ -228,7 +228,7 @@ defmodule Sim.Fleet do
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 
   defp note({:stage, stage, id, facts}, s) do
-    if Said.waits?(stage),
+    if Said.waits?(stage, s.run_log.roles),
       do: %{s | said: Said.hear(s.said, {stage, id, facts})},
       else: %{s | run_log: RunLog.stage(s.run_log, now(s), stage, id, facts)}
   end

@@ -6,7 +6,7 @@ defmodule Swarm.EStop do
 
   It alone owns the state of the emergency stop (`Swarm.EStop.State`), and publishes it on the
   board under `:estop`, for all others to read. The only other copy is the gate's latch, which
-  this process sets. Who calls the gate itself (`Robot.Safety.Gate.estop/1`: its button, as `mix calibrate` does) sets
+  this process sets. Who stops the gate directly (`Robot.Safety.Gate.estop/1`; of ours `mix calibrate` alone) sets
   and clears it, too; the gate reports that (`latch/1`), and this process follows.
 
   Nobody else decides, and nobody waits for this process: the comms process passes on what a
@@ -76,7 +76,7 @@ defmodule Swarm.EStop do
   end
 
   @doc """
-  Reports that the gate has set or cleared its latch, by any button; called by the gate
+  Reports that the gate's latch was set or cleared directly; called by the gate
   (`Robot.Config`, `:on_latch`).
   """
   @spec latch(robot :: atom()) :: :ok

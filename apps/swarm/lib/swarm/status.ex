@@ -16,7 +16,8 @@ defmodule Swarm.Status do
   If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
   person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
   says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
-  that is slow because it has no sonar is `BLIND`. A robot that stands without being told to says
+  that is slow because it has no sonar is `BLIND`, and one that is because another may be near, which it cannot tell, is
+  `CAUTIOUS` (`Robot.Behaviour.Avoid.Caution`). A robot that stands without being told to says
   `FAULT`, and why (`fault`).
 
   If a robot's gate, behaviour or mission hangs, it says so, also for a minute after the restart
@@ -144,7 +145,8 @@ defmodule Swarm.Status do
       uncertainty: entries |> value(:uncertainty) |> field(:radius),
       frame: Frame.of(config, value(entries, :uncertainty)),
       speed: entries |> value(:odometry) |> linear(),
-      limits: field(driving, :limits) || [],
+      limits:
+        (entries |> value(:doing) |> field(:limits) || []) ++ (field(driving, :limits) || []),
       estop: Board.latched?(board),
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
@@ -250,7 +252,8 @@ defmodule Swarm.Status do
         status.estop && "E-STOP",
         Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
-        Enum.any?(status.limits, &("#{&1}" == "blind")) && "BLIND (no sonar; slow)",
+        limited?(status, "blind") && "BLIND (no sonar; slow)",
+        limited?(status, "caution") && "CAUTIOUS (another robot may be near; slow)",
         hung(status.hung),
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         is_binary(status.says) && status.says,
@@ -265,6 +268,8 @@ defmodule Swarm.Status do
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
     end
+
+    defp limited?(status, limit), do: Enum.any?(status.limits, &("#{&1}" == limit))
 
     defp offline(%{offline: lines}, device) do
       case lines do

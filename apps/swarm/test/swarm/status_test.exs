@@ -154,7 +154,7 @@ defmodule Swarm.StatusTest do
       node: :mag1@lab,
       health: %{drive: {:offline, :eacces}, ptz: :online},
       offline: %{drive: "/dev/ttyR0: permission denied"},
-      limits: [:blind],
+      limits: [:blind, :caution],
       fault: "bumper 0 stays pressed"
     }
 
@@ -162,7 +162,8 @@ defmodule Swarm.StatusTest do
     assert inspect(status) =~ ", drive offline (/dev/ttyR0: permission denied)"
     # So does its row, for nodes that cannot reach it.
     {:ok, told} = Status.Row.decode(:mag1, Status.Row.encode(status), 7)
-    assert inspect(told) =~ ", FAULT (bumper 0 stays pressed), BLIND (no sonar; slow), "
+    slow = "BLIND (no sonar; slow), CAUTIOUS (another robot may be near; slow)"
+    assert inspect(told) =~ ", FAULT (bumper 0 stays pressed), #{slow}, "
     assert inspect(told) =~ ", drive offline (/dev/ttyR0: permission denied)"
     # A row of an older version has no text.
     row = status |> Status.Row.encode() |> Map.delete(:words)

@@ -1,6 +1,6 @@
 defmodule Console.Page.About do
   @moduledoc """
-  Describes what a robot knows and does, for the page: who wished, what the gate limits, its way, its devices, what its sonars and its
+  Describes what a robot knows and does, for the page: who wished, what limits it, its way, its devices, what its sonars and its
   camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
   """
   alias Hal.{Json, Odometry, Pose}
@@ -24,7 +24,7 @@ defmodule Console.Page.About do
   def of(robot) do
     with {:ok, board} <- Board.find(robot) do
       entries = Board.entries(board)
-      doing = recent(entries, :doing) || %{by: nil, weights: [], way: [], fault: nil}
+      doing = recent(entries, :doing) || %{by: nil, weights: [], way: [], limits: [], fault: nil}
 
       %{
         by: doing.by,
@@ -32,7 +32,7 @@ defmodule Console.Page.About do
         way: points(doing.way),
         pose: entries |> recent(:pose) |> point(),
         fault: doing.fault,
-        limits: (recent(entries, :driving) || %{limits: []}).limits,
+        limits: doing.limits ++ (recent(entries, :driving) || %{limits: []}).limits,
         power: recent(entries, :power, 60_000),
         offline: for({{:health, device}, {{:offline, _reason}, _age}} <- entries, do: device),
         estop: Board.latched?(board),
@@ -59,7 +59,7 @@ defmodule Console.Page.About do
         way: points(Controller.way(controller)),
         pose: point(percept.pose),
         fault: Controller.fault(controller),
-        limits: (percept.driving || %{limits: []}).limits,
+        limits: Controller.limits(controller) ++ (percept.driving || %{limits: []}).limits,
         power: percept.power,
         offline: [],
         estop: member.stop.held != [],

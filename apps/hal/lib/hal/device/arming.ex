@@ -25,7 +25,7 @@ defmodule Hal.Device.Arming do
   defstruct policy: :auto,
             state: :disarmed,
             why: nil,
-            held?: false,
+            by_person?: false,
             told: %Twist{linear: 0.0, turn: 0.0},
             measured: %Twist{linear: 0.0, turn: 0.0},
             refused: 0
@@ -39,13 +39,13 @@ defmodule Hal.Device.Arming do
   @typedoc """
   `told` is the last speed that was given to the driver, `measured` the last one that odometry
   reported; `refused` counts the speeds other than zero that came while the drive was not armed;
-  `held?` is true after a person has disarmed it.
+  `by_person?` is true after a person has disarmed it.
   """
   @type t :: %__MODULE__{
           policy: policy(),
           state: state(),
           why: String.t() | nil,
-          held?: boolean(),
+          by_person?: boolean(),
           told: Twist.t(),
           measured: Twist.t(),
           refused: non_neg_integer()
@@ -76,7 +76,7 @@ defmodule Hal.Device.Arming do
   @spec ready(t(), readiness()) :: t()
   def ready(%__MODULE__{policy: :never} = arming, _readiness), do: arming
 
-  def ready(%__MODULE__{state: :disarmed, policy: :auto, held?: false} = arming, :ok),
+  def ready(%__MODULE__{state: :disarmed, policy: :auto, by_person?: false} = arming, :ok),
     do: %{arming | state: :armed, why: nil}
 
   def ready(%__MODULE__{state: :disarmed} = arming, :ok), do: %{arming | why: nil}
@@ -128,8 +128,8 @@ defmodule Hal.Device.Arming do
 
   def order(arming, :arm, {:error, line} = error), do: {error, %{disarmed(arming) | why: line}}
 
-  def order(arming, :arm, :ok), do: {:ok, %{arming | state: :armed, why: nil, held?: false}}
-  def order(arming, :disarm, _readiness), do: {:ok, %{disarmed(arming) | held?: true}}
+  def order(arming, :arm, :ok), do: {:ok, %{arming | state: :armed, why: nil, by_person?: false}}
+  def order(arming, :disarm, _readiness), do: {:ok, %{disarmed(arming) | by_person?: true}}
 
   def order(%__MODULE__{state: {:error, _}} = arming, :acknowledge, _readiness),
     do: {:ok, %{arming | state: :disarmed, measured: Twist.zero(), told: Twist.zero()}}

@@ -1,10 +1,10 @@
 defmodule Hal.Device.Server do
   @moduledoc """
   Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
-  which `Hal.Device.Lifecycle` and `Hal.Device.Wishes` do.
+  which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
   """
   use Hal.HardenedServer
-  alias Hal.Device.{Confirmation, Lifecycle, Publisher, State, Wishes}
+  alias Hal.Device.{Confirmation, Lifecycle, Publisher, Requests, State}
   alias Hal.{HardenedServer, Twist}
 
   @rest_ms 500
@@ -33,7 +33,7 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_continue(:open, s), do: {:noreply, open(s)}
 
-  defp open(s), do: s |> Lifecycle.open() |> Wishes.ask() |> Wishes.remind()
+  defp open(s), do: s |> Lifecycle.open() |> Requests.ask() |> Requests.remind()
 
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
@@ -85,10 +85,10 @@ defmodule Hal.Device.Server do
   end
 
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s) when is_float(pan) and is_float(tilt),
-    do: {:noreply, Wishes.wish(s, :look, [pan, tilt])}
+    do: {:noreply, Requests.keep(s, :look, [pan, tilt])}
 
   def handle_cast({:zoom, angle}, %{kind: :ptz} = s) when is_float(angle),
-    do: {:noreply, Wishes.wish(s, :zoom, [angle])}
+    do: {:noreply, Requests.keep(s, :zoom, [angle])}
 
   @impl GenServer
   def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}
@@ -131,7 +131,7 @@ defmodule Hal.Device.Server do
     |> Confirmation.heard(readings)
     |> Lifecycle.measured(readings)
     |> Lifecycle.judge()
-    |> Wishes.ask()
+    |> Requests.ask()
   end
 
   # Whoever asked has been told by then that nothing was done, and may stand in front of the

@@ -7,7 +7,7 @@ defmodule Hal.Device.State do
   |---|---|
   | `Hal.Device.Server` | the process: receives messages and decides the order of the work |
   | `Hal.Device.Lifecycle` | opens and closes the driver, judges it, drives the wheels |
-  | `Hal.Device.Wishes` | requests to a camera or a pan-tilt unit |
+  | `Hal.Device.Requests` | requests to a camera or a pan-tilt unit |
   | `Hal.Device.Watchdog` | stops wheels that receive no further speed |
   | `Hal.Device.Publisher` | reports changes to sinks and events |
   | `Hal.Device.Liveness`, `Hal.Device.Obedience`, `Hal.Device.Arming` | pure: whether it shows signs of life; whether it does what it is told; whether wheels may turn |
@@ -26,7 +26,7 @@ defmodule Hal.Device.State do
                 arming: nil,
                 armed_as: nil,
                 was: nil,
-                wishes: %{},
+                requests: %{},
                 about: %{},
                 sonar?: false,
                 signs: nil,
@@ -60,7 +60,7 @@ defmodule Hal.Device.State do
           arming: Arming.t() | nil,
           armed_as: {Arming.state(), String.t() | nil} | nil,
           was: {module(), atom(), list()} | nil,
-          wishes: %{atom() => list()},
+          requests: %{atom() => list()},
           about: map(),
           sonar?: boolean(),
           signs: Liveness.t() | nil,

@@ -1,7 +1,7 @@
 defmodule Hal.Drive.SlewLimiter do
   @moduledoc """
-  Limits every requested speed and its change: the last limit before the wire. Pure. `Robot.Safety.Reflex` uses the same
-  ramp, `approach/4`.
+  Limits every speed that a driver is given, and its change. Pure. In the driver that uses it (`Hal.RFlex.Driver`) it is the
+  last limit before the wire, after gate and arming; the gate's ramp (`Robot.Safety.Reflex`) is the same, `approach/4`.
 
   Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks
   at most by its braking, which may be larger. **A requested speed of zero applies at once**: a

@@ -203,6 +203,15 @@ defmodule Robot.Control.Controller do
   @spec weights(t()) :: [{by :: atom(), weight :: float()}]
   def weights(%__MODULE__{weights: weights}), do: weights
 
+  @doc "What made the goal's wish slower at the last tick, before the gate: `:caution` (`Robot.Behaviour.Avoid.Caution`)."
+  @spec limits(t()) :: [:caution]
+  def limits(%__MODULE__{goal: {Avoid, state}, percept: %Percept{} = percept}) do
+    {slow?, _echoes} = Avoid.Caution.check(percept, state.discs, state.echoes)
+    if slow?, do: [:caution], else: []
+  end
+
+  def limits(%__MODULE__{}), do: []
+
   @doc """
   The corners of the way that its goal takes round what stands about (map frame, metres), the goal last and #{@most_corners}
   at most; none where it takes no such way.

@@ -8,7 +8,8 @@ defmodule Robot.Control.Executive do
   kills it.
 
   A goal is for now: while the wheels may not turn it is refused (`Robot.Safety.Readiness`), and when
-  they are disarmed, by whatever, it is dropped, so that arming starts nothing.
+  they are disarmed, by whatever, it is dropped, so that arming starts nothing. An executive that is held (`hold/1`) refuses
+  goals while a mission is being ended; a robot that is held is one that an e-stop holds (`docs/glossary.md`).
 
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
@@ -95,7 +96,7 @@ defmodule Robot.Control.Executive do
     Gate.forget(id)
     board = Board.find!(id)
     at_ms = Robot.Config.now(config)
-    doing = %{by: :idle, weights: [], way: [], outcome: nil, fault: nil, tick: 0}
+    doing = %{by: :idle, weights: [], way: [], limits: [], outcome: nil, fault: nil, tick: 0}
     Board.put(board, :executive, :doing, doing, at_ms)
     Board.put(board, :executive, :goal, nil, at_ms)
     Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
@@ -230,6 +231,7 @@ defmodule Robot.Control.Executive do
       by: wish.by,
       weights: Controller.weights(controller),
       way: Controller.way(controller),
+      limits: Controller.limits(controller),
       outcome: outcome,
       fault: fault,
       tick: s.tick + 1

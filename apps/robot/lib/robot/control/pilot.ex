@@ -138,7 +138,7 @@ defmodule Robot.Control.Pilot do
     # goal, or wait for the end of a mission that has ended so.
     Journal.answered(data.board)
     Journal.begun(data)
-    Effects.rest(config)
+    Effects.drop_orders(config)
     Executive.stand(config.id)
     {:ok, {:idle, Journal.told(:idle, %{}, data)}}
   end
@@ -284,7 +284,7 @@ defmodule Robot.Control.Pilot do
     with {:ok, options} <- mission(module, options, data),
          :ok <- Readiness.of(data.config, data.board) do
       Journal.heard({:start, module, options}, data)
-      Effects.rest(data.config)
+      Effects.drop_orders(data.config)
       result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
       follow(result, state, %{data | options: options})
     end

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Anchors do
   @moduledoc """
-  The references by which the localiser corrects the pose, as a mission gives them: the frame, and
+  Holds the references by which the localiser corrects the pose, as a mission gives them: the frame, and
   the places of known objects. Pure data and functions on it.
 
   The frame is that of the leader, whose pose nobody corrects: its own estimate defines the frame.

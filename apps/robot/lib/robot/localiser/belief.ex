@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Belief do
   @moduledoc """
-  A pose and its uncertainty: an extended Kalman filter, moved by odometry and corrected by one
+  Estimates a pose and its uncertainty: an extended Kalman filter, moved by odometry and corrected by one
   scalar measurement after another. Pure.
 
   Its states are x, y and heading, and the systematic errors behind them:

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Columns do
   @moduledoc """
-  Sets of columns of a camera picture, which is divided into 59 columns of equal width. Pure.
+  Reckons with sets of columns of a camera picture, which is divided into 59 columns of equal width. Pure.
 
   A set is an integer, one bit for each column; bit 0 is the leftmost.
   """

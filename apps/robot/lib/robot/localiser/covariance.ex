@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Covariance do
   @moduledoc """
-  A covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
+  Defines a covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
   it. Pure.
 
   A belief has at most 20 states, for which lists are fast enough.

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.History do
   @moduledoc """
-  The poses of odometry at the last ticks, for pictures that were taken a moment ago. Pure.
+  Keeps the poses of odometry at the last ticks, for pictures that were taken a moment ago. Pure.
   """
   alias Hal.Pose
 

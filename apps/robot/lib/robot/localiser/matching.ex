@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Matching do
   @moduledoc """
-  Data association: decides which blob is which robot, although all robots look the same. Pure.
+  Decides which blob is which robot, although all robots look the same (data association). Pure.
 
   A blob can be a robot if its direction and its width are about those expected of the robot. If a
   blob could well be several robots, or a robot several blobs, neither is paired. A wider blob may

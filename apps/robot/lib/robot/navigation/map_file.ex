@@ -1,8 +1,8 @@
 defmodule Robot.Navigation.MapFile do
   @moduledoc """
-  A floor plan as map_server writes it: a description in YAML (`.Description`) and the picture that it names, PNG or PGM
-  (`.Picture`). It gives a robot the walls of its building (`Robot.Navigation.Grid`) in the frame of the map, in which the
-  description says where the picture lies.
+  Reads and saves a floor plan as map_server writes it: a description in YAML (`.Description`) and the picture that it names,
+  PNG or PGM (`.Picture`). It gives a robot the walls of its building (`Robot.Navigation.Grid`) in the frame of the map, in
+  which the description says where the picture lies.
 
   What the picture does not cover is wall; so only the part of it with floor becomes the grid, and only that must not be
   larger than a robot can search for a way ten times a second.

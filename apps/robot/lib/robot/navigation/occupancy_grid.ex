@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.OccupancyGrid do
   @moduledoc """
-  The walls that a robot's sonars have seen: evidence for the cells of a square window of 20 m that follows the robot
+  Holds the walls that a robot's sonars have seen: evidence for the cells of a square window of 20 m that follows the robot
   (Moravec and Elfes 1985). Pure.
 
   An echo raises the cells on its arc and lowers those before it; no echo only lowers. What another robot or a

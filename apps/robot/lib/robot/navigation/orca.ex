@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Orca do
   @moduledoc """
-  Optimal reciprocal collision avoidance (van den Berg, Guy, Lin and Manocha 2011): which
+  Solves optimal reciprocal collision avoidance (van den Berg, Guy, Lin and Manocha 2011): which
   velocities avoid contact for some time if the others do their share, and which of them is
   nearest to the desired one. Pure; metres, seconds, map frame.
 

@@ -53,7 +53,7 @@ defmodule Robot.Safety.Gate do
   Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
   the drive's device, and the latch is in its file (`Robot.Board.saved/2`). The process that owns
   the state of the e-stop sets the latch with `tell: false`: then the config's `:on_latch` is not
-  applied, and this does not wait for the file.
+  applied, and this does not wait for the file. Anybody else stops the gate directly, as `mix calibrate` does.
   """
   @spec estop(robot :: atom(), tell: boolean()) :: :ok
   def estop(robot, options \\ []),
@@ -61,8 +61,8 @@ defmodule Robot.Safety.Gate do
 
   @doc """
   Clears the e-stop: wishes count again. The person who resets must have looked where the robot
-  would go. `:tell` is as in `estop/2`. With `presses:` the reset applies to stops up to that
-  press of the button (`:presses` on the board), and is refused if there was another one since.
+  would go. `:tell` is as in `estop/2`. With `presses:` the reset applies to direct stops up to
+  that one (`presses/1`), and is refused if there was another one since.
   """
   @spec reset(robot :: atom(), tell: boolean(), presses: non_neg_integer()) ::
           :ok | {:error, :pressed}
@@ -71,7 +71,7 @@ defmodule Robot.Safety.Gate do
     GenServer.call(Names.via(robot, :gate), {:reset, tell?, presses})
   end
 
-  @doc "How often the gate's own button was pressed, as counted by `estop/1`; 0 if never."
+  @doc "How often the gate was stopped directly, by `estop/1` without `tell: false`; 0 if never."
   @spec presses(Board.t()) :: non_neg_integer()
   def presses(board) do
     with {:ok, presses, _at_ms} <- Board.fetch(board, :presses, :infinity),
@@ -141,7 +141,7 @@ defmodule Robot.Safety.Gate do
     s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
     if tell?, do: tell_latch(s)
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
-    # Whoever pressed the button may wait for a disk; these steps do not.
+    # Whoever stops it directly may wait for a disk; these steps do not.
     if tell?,
       do: Board.saved(s.board, {GenServer, :reply, [from, :ok]}),
       else: GenServer.reply(from, :ok)

@@ -1,11 +1,13 @@
 defmodule Robot.Safety.Reflex do
   @moduledoc """
-  Applies the safety limits between a wish and the wheels, as a function. It does not compete with the behaviours'
-  wishes; it limits the wish that won. Pure: `wish/3` and `sense/3` take what happened; `step/2` (every 50 ms) decides
-  what the wheels may do now, and reports why it is less than wished. For a reading that must not wait for the next step
-  `sense/3` returns `:now`; so does `forget/1` while the robot moves.
+  Applies the safety limits between a wish and the drive's device, as a function. It limits the wish that the arbiter chose,
+  so no behaviour and no mission comes after it; arming (`Hal.Device.Arming`) and the driver (`Hal.Drive.SlewLimiter`) do.
+  Pure: `wish/3` and `sense/3` take what happened; `step/2` (every 50 ms) decides what the wheels may do now, and reports
+  why it is less than wished. For a reading that must not wait for the next step `sense/3` returns `:now`; so does
+  `forget/1` while the robot moves.
 
-  The limits, each by its name in `limits`; each of the first four excludes all others:
+  The limits, each by its name in `limits`, in the order in which they are applied; each of the first four excludes all
+  others, and `:blind` is in the place of `:near` and `:beside`:
 
   | limit | what it does |
   |---|---|
@@ -14,13 +16,13 @@ defmodule Robot.Safety.Reflex do
   | `:dead_man` | no wish for 200 ms: stands |
   | `:refused` | the wish was not a pair of numbers, or was absurdly large: stands |
   | `:speed` | the profile's greatest speeds |
-  | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
+  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
   | `:beside` | slowly past what the sonars see less than 0.15 m beside its way |
   | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
   | `:fence` | stops before its fence (`Robot.Fence`); no driving without a place |
-  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
   | `:acceleration` | the profile's accelerations; braking may be twice as hard |
+  | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
 
   `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero immediately:
   how hard the wheels then brake depends on the base. All other limits pass through the ramp of

@@ -52,6 +52,21 @@ defmodule Robot.Control.ControllerTest do
       controller |> Controller.stand() |> Controller.tick(Body.percept(body))
   end
 
+  test "says that its goal's wish was slowed down by caution, and only then" do
+    %{controller: controller} =
+      body = Pose.new(0, 0) |> Body.new() |> with_goal(1, {Goto, x: 5.0, y: 0.0})
+
+    far = %{pose: Pose.new(0, 9), twist: Twist.zero(), radius: 0.2, at_ms: 0, mode: :holding}
+
+    for {lost?, speed, limits} <- [{false, 0.5, []}, {true, 0.2, [:caution]}] do
+      unsure = %{radius: 4.0, lost?: lost?}
+      percept = %{Body.percept(body) | peers: %{mag2: far}, uncertainty: unsure}
+      {wish, nil, controller} = Controller.tick(controller, percept)
+      assert {wish.twist.linear, Controller.limits(controller)} == {speed, limits}
+      assert Controller.limits(Controller.stand(controller)) == []
+    end
+  end
+
   test "without a pose it stands and waits" do
     body = Pose.new(0, 0) |> Body.new() |> with_goal(1, {Goto, x: 2.0, y: 0.0})
     {nil, body} = Body.run(body, 20, &%{&1 | pose: nil})

@@ -18,9 +18,12 @@ defmodule Sim.Fleet.Said do
   @type t :: [{looks :: non_neg_integer(), stage()}]
   @type stage :: {name :: atom(), robot :: atom(), facts :: map()}
 
+  @typedoc "What the mission's phases and stages are (`Robot.Mission.roles/1`)."
+  @type roles :: %{atom() => Robot.Mission.role()}
+
   @doc "Whether a stage has to wait for the robot's claim."
-  @spec waits?(stage :: atom()) :: boolean()
-  def waits?(stage), do: stage in [:elected, :formed]
+  @spec waits?(stage :: atom(), roles()) :: boolean()
+  def waits?(stage, roles), do: stage == :formed or roles[stage] == :elects
 
   @doc "Adds a stage that a robot reported."
   @spec hear(t(), stage()) :: t()
@@ -31,22 +34,21 @@ defmodule Sim.Fleet.Said do
 
       iex> formed = {:formed, :mag1, %{epoch: 2}}
       iex> said = Sim.Fleet.Said.hear([], formed)
-      iex> {[], said} = Sim.Fleet.Said.look(said, mag1: %{phase: :lead})
-      iex> Sim.Fleet.Said.look(said, mag1: %{phase: :lead, formed: true})
+      iex> {[], said} = Sim.Fleet.Said.look(said, [mag1: %{phase: :lead}], %{lead: :leads})
+      iex> Sim.Fleet.Said.look(said, [mag1: %{phase: :lead, formed: true}], %{lead: :leads})
       {[{:formed, :mag1, %{epoch: 2}}], []}
   """
-  @spec look(t(), [{robot :: atom(), claim :: map()}]) :: {[stage()], t()}
-  def look(said, claims) do
-    {told, left} = Enum.split_with(said, &(shown?(&1, claims) or late?(&1)))
+  @spec look(t(), [{robot :: atom(), claim :: map()}], roles()) :: {[stage()], t()}
+  def look(said, claims, roles) do
+    {told, left} = Enum.split_with(said, &(shown?(&1, claims, roles) or late?(&1)))
     left = for {looks, stage} <- left, do: {looks + 1, stage}
     {Enum.map(told, &elem(&1, 1)), left}
   end
 
-  defp shown?({_looks, {:elected, robot, _facts}}, claims),
-    do: match?({_id, %{phase: :lead}}, List.keyfind(claims, robot, 0))
-
-  defp shown?({_looks, {:formed, robot, _facts}}, claims),
-    do: match?({_id, %{phase: :lead, formed: true}}, List.keyfind(claims, robot, 0))
+  defp shown?({_looks, {stage, robot, _facts}}, claims, roles) do
+    claim = Keyword.get(claims, robot, %{})
+    roles[claim[:phase]] == :leads and (stage != :formed or claim[:formed] == true)
+  end
 
   defp late?({looks, _stage}), do: looks >= @looks - 1
 end

@@ -34,11 +34,15 @@ defmodule Sim.Scenario.View do
     end
   end
 
+  @doc "What the robot does for its group in the phase it is in (`Robot.Mission.roles/1`); `nil` for nothing."
+  @spec role(Trial.t(), atom()) :: Robot.Mission.role() | nil
+  def role(trial, robot), do: trial.run_log.roles[phase(trial, robot)]
+
   @doc "Each part of the radio's network, with those who lead in it."
   @spec leaders(Trial.t()) :: [{part :: [atom()], leaders :: [atom()]}]
   def leaders(trial) do
     for part <- Radio.parts(trial.radio, Trial.living(trial)),
-        do: {part, Enum.filter(part, &(phase(trial, &1) == :lead))}
+        do: {part, Enum.filter(part, &(role(trial, &1) == :leads))}
   end
 
   @doc "The true pose of a robot."

@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.NameClaim do
   @moduledoc """
-  A robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
+  Settles a robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
   lower `{boot, node}` stays. The other leaves the directory and gives way, until the first has
   been neither heard nor found in the directory for 10 s: perhaps it never existed, and somebody
   only said so.

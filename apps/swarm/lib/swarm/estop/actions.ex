@@ -14,8 +14,7 @@ defmodule Swarm.EStop.Actions do
   # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release nobody
   # would hear of stays held.
   @release_us 400_000
-  # For so long a button that is pressed while the robot is stopped makes no further call. Nobody resets another robot
-  # in that time.
+  # For so long a stop of a robot that is stopped makes no further call. Nobody resets another robot in that time.
   @anew_us 100_000
 
   @typedoc """
@@ -40,7 +39,7 @@ defmodule Swarm.EStop.Actions do
   def written(board), do: published(board) || EStop.State.new()
 
   @doc """
-  The state with which an e-stop process begins, and the press of the gate's button that it has followed: what the one
+  The state with which an e-stop process begins, and the direct stop of the gate that it has followed: what the one
   before it recorded; before the first did, the gate's latch, which has survived a restart, is a stop of its own.
   """
   @spec begin(Board.t()) :: {EStop.State.t(), presses :: non_neg_integer()}
@@ -94,8 +93,7 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  # A robot that is not held drives on. A button on the gate itself may have been pressed since
-  # the request.
+  # A robot that is not held drives on. The gate may have been stopped directly since the request.
   def obey(s, :reset, {ref, given_us}) do
     if Board.latched?(s.board) do
       Nonblocking.answer(ref, {:error, "#{s.id} was stopped meanwhile; reset it again"})
@@ -153,7 +151,7 @@ defmodule Swarm.EStop.Actions do
     call = Broadcaster.call()
     s = become(pressed(s), EStop.State.press(before, call))
 
-    # A button that is pressed again and again is one call to the others; heartbeats tell the rest.
+    # Stops again and again are one call to the others; heartbeats tell the rest.
     if EStop.State.held?(before) and s.sounded_us != nil and now_us() - s.sounded_us < @anew_us do
       s
     else
@@ -180,7 +178,7 @@ defmodule Swarm.EStop.Actions do
         Nonblocking.answer(ref, :ok)
         s
 
-      # The gate's report of its button is on the way.
+      # The gate's report of a direct stop is on the way.
       {:error, :pressed} ->
         EStop.Answer.stopped_again(s.id, ref)
         s
@@ -234,9 +232,8 @@ defmodule Swarm.EStop.Actions do
   end
 
   @doc """
-  Follows a button on the gate itself, which has set or cleared the latch; the latch counts as it
-  is now. It may have been set again although it was set: a reset that is being carried out was
-  given before that.
+  Follows the gate, whose latch was set or cleared directly; the latch counts as it is now. It may have
+  been set again although it was set: a reset that is being carried out was given before that.
   """
   @spec follow(t()) :: t()
   def follow(%{presses: before} = s) do
@@ -261,7 +258,7 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  @doc "Records which press of the gate's button was followed."
+  @doc "Records which direct stop of the gate was followed."
   @spec record(t()) :: t()
   def record(s) do
     Board.put(s.board, :estop, :followed, s.presses, Robot.Config.now(s.config))

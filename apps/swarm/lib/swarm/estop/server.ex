@@ -36,8 +36,8 @@ defmodule Swarm.EStop.Server do
 
   @impl GenServer
   def handle_continue(:enter, s) do
-    # A stop that the previous e-stop process recorded may not have reached the gate; and what was
-    # pressed on the gate since then has reached nobody.
+    # A stop that the previous e-stop process recorded may not have reached the gate; and a
+    # direct stop of the gate since then has reached nobody.
     s = EStop.Actions.hold(s)
 
     followed? =

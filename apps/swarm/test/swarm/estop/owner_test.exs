@@ -27,8 +27,8 @@ defmodule Swarm.EStop.OwnerTest do
   @doc false
   def carry(test, from, _ids, message), do: send(test, {:carried, from, message})
 
-  test "a button on the gate itself reaches it even if the comms process hangs" do
-    id = robot(:owner_button)
+  test "a direct stop of the gate reaches it even if the comms process hangs" do
+    id = robot(:owner_direct)
     comms = Names.whereis(id, :comms)
     :ok = :sys.suspend(comms)
     :ok = Gate.estop(id)
@@ -75,7 +75,7 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id) or EStop.State.held?(stop_of(id))
   end
 
-  test "what was pressed on the gate while there was no e-stop process is followed by the next one" do
+  test "a direct stop of the gate while there was no e-stop process is followed by the next one" do
     id = robot(:owner_gone)
     estop = Names.whereis(id, :estop)
     :ok = :sys.suspend(estop)
@@ -132,7 +132,7 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id)
   end
 
-  test "the gate's button pressed while a reset is carried out is stronger" do
+  test "a direct stop of the gate while a reset is carried out is stronger" do
     id = robot(:owner_reset)
     pilot = Names.whereis(id, :pilot)
     assert Swarm.ask(id, :estop) == :ok
@@ -149,7 +149,7 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id)
   end
 
-  test "a reset from before the gate's button was pressed does not clear it" do
+  test "a reset from before a direct stop of the gate does not clear it" do
     id = robot(:owner_before)
     estop = Names.whereis(id, :estop)
     :ok = :sys.suspend(estop)
@@ -162,14 +162,14 @@ defmodule Swarm.EStop.OwnerTest do
     assert latched?(id)
   end
 
-  test "a button that is pressed on one robot stops another that is being reset" do
+  test "a direct stop of one gate stops another robot that is being reset" do
     [here, there] = for id <- [:owner_here, :owner_there], do: robot(id)
     assert Swarm.estop() == :ok
     pilot = Names.whereis(here, :pilot)
     :ok = :sys.suspend(pilot)
     asked = Task.async(fn -> Swarm.ask(here, :reset) end)
     eventually(fn -> Process.info(pilot, :message_queue_len) != {:message_queue_len, 0} end)
-    # While the first waits for its pilot, somebody presses the button of the other.
+    # While the first waits for its pilot, the gate of the other is stopped directly.
     :ok = Gate.estop(there)
     settled(there, [:estop])
     settled(here, [:estop])
@@ -199,7 +199,7 @@ defmodule Swarm.EStop.OwnerTest do
     assert Swarm.reset() == :ok
   end
 
-  test "the gate's button pressed when the gate is about to be released is stronger" do
+  test "a direct stop of the gate when it is about to be released is stronger" do
     id = robot(:owner_about)
     [pilot, estop] = for role <- [:pilot, :estop], do: Names.whereis(id, role)
     assert Swarm.ask(id, :estop) == :ok

@@ -36,8 +36,8 @@ defmodule Robot.Control.Pilot.Effects do
   end
 
   @doc "Makes the executive drop the orders of a mission that has ended."
-  @spec rest(Robot.Config.t()) :: :ok
-  def rest(%Robot.Config{id: id}) do
+  @spec drop_orders(Robot.Config.t()) :: :ok
+  def drop_orders(%Robot.Config{id: id}) do
     for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],
         do: Executive.obey(id, order)
 

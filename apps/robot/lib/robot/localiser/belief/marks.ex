@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Belief.Marks do
   @moduledoc """
-  The marks of a belief: objects at reported places, each with the offset from there as two states
+  Keeps the marks of a belief: objects at reported places, each with the offset from there as two states
   of the filter. Adds a mark when it is first met, keeps up with what is reported of it, and drops
   the one that was used least recently when there are too many. Pure.
   """

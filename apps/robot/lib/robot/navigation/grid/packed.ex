@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Grid.Packed do
   @moduledoc """
-  The walls of a grid as a small term, for messages and recordings: only where walls are. Pure.
+  Packs the walls of a grid into a small term, for messages and recordings: only where walls are. Pure.
 
   A grid is the same after it was packed and unpacked; its clearances are computed again.
   """

@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.Grid.Way do
   @moduledoc """
-  The cheapest way of a robot over a grid of walls. Pure.
+  Finds the cheapest way of a robot over a grid of walls. Pure.
 
   It is found by A* (Hart, Nilsson and Raphael 1968) over the cells with enough clearance, 8 neighbours, no corner cut;
   cells near walls cost more. Then it is pulled straight: from each of its corners the robot sees the next.

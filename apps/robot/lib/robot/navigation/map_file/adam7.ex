@@ -1,6 +1,7 @@
 defmodule Robot.Navigation.MapFile.Adam7 do
   @moduledoc """
-  Interlaced PNG pictures: seven smaller pictures, of every eighth pixel and then of those between, become one. Pure.
+  Puts interlaced PNG pictures together: seven smaller ones, of every eighth pixel and then of those between, become
+  one. Pure.
   """
 
   # The first column and row of each, and how far the next are.

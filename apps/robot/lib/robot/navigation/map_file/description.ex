@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.MapFile.Description do
   @moduledoc """
-  The description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
+  Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
   (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
   corner of the picture lies), and optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
   Read as data: no other YAML is understood, other keys are ignored. Pure.

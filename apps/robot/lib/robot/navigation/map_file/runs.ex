@@ -1,6 +1,6 @@
 defmodule Robot.Navigation.MapFile.Runs do
   @moduledoc """
-  Rows of bytes as runs, and areas of runs that touch. A plan has few runs for its many cells, so
+  Turns rows of bytes into runs, and finds areas of runs that touch. A plan has few runs for its many cells, so
   that what would take seconds cell by cell takes milliseconds. Pure.
   """
 

@@ -1,7 +1,7 @@
 defmodule Robot.Navigation.MapFile.Writer do
   @moduledoc """
-  A map that robots have made, as map_server writes it: a description in YAML, and a PGM picture of three shades, 254 for free,
-  0 for wall and 205 for unknown. Pure.
+  Makes the files of a map that robots have made, as map_server writes them: a description in YAML, and a PGM picture of three
+  shades, 254 for free, 0 for wall and 205 for unknown. Pure.
   """
 
   @typedoc """

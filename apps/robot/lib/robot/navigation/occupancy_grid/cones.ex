@@ -1,7 +1,7 @@
 defmodule Robot.Navigation.OccupancyGrid.Cones do
   @moduledoc """
-  The readings of a ring of sonars as the kernels of `Robot.Navigation.OccupancyGrid` take them: for each a cone, in cells
-  of 10 cm. Pure.
+  Turns the readings of a ring of sonars into what the kernels of `Robot.Navigation.OccupancyGrid` take: for each a cone, in
+  cells of 10 cm. Pure.
   """
   alias Hal.Pose
   alias Robot.Percept

@@ -1,7 +1,7 @@
 defmodule Robot.Safety.Reflex.Limits do
   @moduledoc """
   Applies the limits of the robot's speeds, its surroundings and its fence to a wish that may be
-  carried out: those from `:speed` to `:acceleration` in the table of `Robot.Safety.Reflex`, one
+  carried out: those from `:speed` to `:bumper` in the table of `Robot.Safety.Reflex`, one
   after the other. Pure.
   """
   alias Hal.Drive.SlewLimiter

@@ -59,8 +59,11 @@ defmodule Sim.Scenario.Check.Fleet do
     reach(so?, fn _ -> Enum.map_join(named, ", ", &view/1) end)
   end
 
-  def judge({:rest, _by}, trial, _), do: phase(:all, :rest, trial)
-  def judge({:phase, who, phase, _by}, trial, _), do: phase(who, phase, trial)
+  def judge({:rest, _by}, trial, _), do: all(trial, :all, &(View.role(trial, &1) == :rests))
+
+  def judge({:phase, who, phase, _by}, trial, _),
+    do: all(trial, who, &(View.phase(trial, &1) == phase))
+
   def judge({:never_phase, who, phase}, trial, _), do: never(who, phase, trial)
   def judge({:never_phase, who, phase, _window}, trial, _), do: never(who, phase, trial)
 
@@ -115,9 +118,9 @@ defmodule Sim.Scenario.Check.Fleet do
   defp view({id, nil, epoch}), do: "#{id} follows nobody (epoch #{epoch || 0})"
   defp view({id, leader, epoch}), do: "#{id} names #{leader} (epoch #{epoch})"
 
-  defp phase(who, phase, trial) do
+  defp all(trial, who, so?) do
     robots = View.who(trial, who)
-    so? = robots != [] and Enum.all?(robots, &(View.phase(trial, &1) == phase))
+    so? = robots != [] and Enum.all?(robots, so?)
     reach(so?, fn _ -> phases(trial, robots) end)
   end
 

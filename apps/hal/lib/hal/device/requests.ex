@@ -1,18 +1,18 @@
-defmodule Hal.Device.Wishes do
+defmodule Hal.Device.Requests do
   @moduledoc """
-  Requests to a device other than speeds: the direction and zoom of a pan-tilt unit, and a
+  Gives a driver the requests other than speeds: the direction and zoom of a pan-tilt unit, and a
   camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
   """
   alias Hal.Device.{Lifecycle, Obedience, State}
 
   @doc "Keeps a request, and passes it to the driver if that is open and has this callback."
-  @spec wish(State.t(), callback :: atom(), arguments :: list()) :: State.t()
-  def wish(s, callback, arguments),
-    do: carry_out(%{s | wishes: Map.put(s.wishes, callback, arguments)}, callback)
+  @spec keep(State.t(), callback :: atom(), arguments :: list()) :: State.t()
+  def keep(s, callback, arguments),
+    do: carry_out(%{s | requests: Map.put(s.requests, callback, arguments)}, callback)
 
   @doc "Repeats the kept requests to a driver that has just been opened."
   @spec remind(State.t()) :: State.t()
-  def remind(s), do: s.wishes |> Map.keys() |> Enum.reduce(s, &carry_out(&2, &1))
+  def remind(s), do: s.requests |> Map.keys() |> Enum.reduce(s, &carry_out(&2, &1))
 
   @doc "Asks a camera for its next picture; called once the last one has been passed on."
   @spec ask(State.t()) :: State.t()
@@ -22,7 +22,7 @@ defmodule Hal.Device.Wishes do
   def ask(s), do: s
 
   defp carry_out(%{inner: {:open, inner}} = s, callback) do
-    arguments = s.wishes[callback] ++ [inner]
+    arguments = s.requests[callback] ++ [inner]
 
     if function_exported?(s.driver, callback, length(arguments)),
       do: s |> told(callback) |> Lifecycle.done(apply(s.driver, callback, arguments)),
@@ -31,7 +31,7 @@ defmodule Hal.Device.Wishes do
 
   defp carry_out(s, _callback), do: s
 
-  defp told(%{wishes: %{look: [pan, tilt]}} = s, :look),
+  defp told(%{requests: %{look: [pan, tilt]}} = s, :look),
     do: %{s | obedience: Obedience.told(s.obedience, {pan, tilt})}
 
   defp told(s, _callback), do: s
