@@ -216,7 +216,8 @@ defmodule Missions.Landmark do
     end
   end
 
-  defp stage(:search, _mission), do: [{:stage, :search, %{}}]
+  # Of all: one that searches from room to room looks around again and again.
+  defp stage(:search, %{lookout: nil}), do: [{:stage, :search, %{}}]
 
   defp stage(:lead, mission),
     do: [{:stage, :elected, %{epoch: mission.epoch, size_ppm: mission.size_ppm}}]

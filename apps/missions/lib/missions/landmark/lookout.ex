@@ -56,10 +56,19 @@ defmodule Missions.Landmark.Lookout do
   def turned(%{percept: %{pose: pose}} = mission) do
     lookout = mission.lookout || %Legs{coverage: %Coverage{}}
     at = Pose.point(pose)
-    tried = if lookout.target, do: [lookout.target.at | lookout.tried], else: lookout.tried
-    lookout = %{lookout | at: at, heard: [at | lookout.heard], tried: tried}
+    lookout = %{leave(lookout, mission.now_ms) | at: at, heard: [at | lookout.heard]}
     plan(mission, %{lookout | target: nil, stand: nil, told?: false})
   end
+
+  # A leg that took too long did not come to its end; one that was interrupted, or waited, may still be gone.
+  defp leave(%{arrived?: true, target: %{at: at}} = lookout, _now_ms),
+    do: %{lookout | tried: [at | lookout.tried]}
+
+  defp leave(%{stand: {_x, _y}, target: %{at: at}, leg_ms: leg_ms} = lookout, now_ms)
+       when now_ms - leg_ms >= @leg_ms,
+       do: Legs.give_up(lookout, at)
+
+  defp leave(lookout, _now_ms), do: lookout
 
   defp plan(mission, lookout), do: %{mission | lookout: Legs.plan(lookout, mission)}
 
@@ -140,9 +149,17 @@ defmodule Missions.Landmark.Lookout do
     plan? = match?(%{grid: %{closed?: true}}, percept)
 
     cond do
-      mission.phase != :rest -> "has looked at #{area}, goes on to the next room"
-      plan? -> "no landmark: has looked at all that it can reach, #{area}"
-      true -> "no landmark in the #{area} that it has looked at"
+      mission.phase != :rest ->
+        "has looked at #{area}, goes on to the next room"
+
+      plan? and lookout.missed == 0 ->
+        "no landmark: has looked at all that it can reach, #{area}"
+
+      lookout.missed > 0 ->
+        "no landmark in the #{area} that it has looked at; places that it did not get to: #{lookout.missed}"
+
+      true ->
+        "no landmark in the #{area} that it has looked at"
     end
   end
 end

@@ -80,6 +80,12 @@ defmodule Missions.Landmark.LookoutTest do
     mission = Lookout.turned(mission())
     refute Lookout.arrived?(%{mission | now_ms: 69_000})
     assert Lookout.arrived?(%{mission | now_ms: 71_000})
+    assert Lookout.turned(%{mission | now_ms: 79_000}).lookout.missed == 1
+
+    # One that a round interrupts is gone again.
+    interrupted = Lookout.turned(%{mission | now_ms: 30_000})
+    assert interrupted.lookout.target.at == mission.lookout.target.at
+    assert interrupted.lookout.missed == 0
   end
 
   test "a place that it cannot get to is not tried again" do
@@ -90,6 +96,9 @@ defmodule Missions.Landmark.LookoutTest do
     if Lookout.left?(mission), do: assert(Pose.distance(mission.lookout.target.at, first) > 0.5)
     again = Lookout.turned(mission)
     for %{at: at} <- again.lookout.open, do: assert(Pose.distance(at, first) > 0.5)
+    # It does not say that it has looked at all.
+    assert Lookout.says(%{again | phase: :rest}) =~ "did not get to: "
+    refute Lookout.says(%{again | phase: :rest}) =~ "all that it can reach"
   end
 
   test "what others have looked at is looked at" do

@@ -40,6 +40,7 @@ defmodule Missions.Landmark.Lookout.Legs do
                 target: nil,
                 stand: nil,
                 tried: [],
+                missed: 0,
                 others: %{},
                 at: nil,
                 leg: 0,
@@ -52,7 +53,8 @@ defmodule Missions.Landmark.Lookout.Legs do
   @typedoc """
   `coverage` is what has been looked at, `area` m2 of it free, without what can be seen from the places in `heard`, where
   others have turned since. `open` are the frontiers that are left, and `target` the one that it will see: by going to `stand`, which is
-  leg number `leg`, since `leg_ms`, or `nil` as long as another one goes there. `tried` are those to which it went. `others` are the goals that others
+  leg number `leg`, since `leg_ms`, or `nil` as long as another one goes there. `tried` are those to which it went, so many of which it
+  `missed`, because it did not get there. `others` are the goals that others
   told last, `at` is where it turned last, and it has `told?` that and its goal. `arrived?` says that it is at `stand`.
   """
   @type t :: %__MODULE__{
@@ -63,6 +65,7 @@ defmodule Missions.Landmark.Lookout.Legs do
           target: Frontiers.frontier() | nil,
           stand: Pose.point() | nil,
           tried: [Pose.point()],
+          missed: non_neg_integer(),
           others: %{atom() => Frontiers.Choice.goal() | nil},
           at: Pose.point() | nil,
           leg: non_neg_integer(),
@@ -94,7 +97,14 @@ defmodule Missions.Landmark.Lookout.Legs do
   @doc "Without a place to which it does not get."
   @spec give_up(t(), Pose.point()) :: t()
   def give_up(lookout, at) do
-    lookout = %{lookout | tried: [at | lookout.tried], target: nil, stand: nil}
+    lookout = %{
+      lookout
+      | tried: [at | lookout.tried],
+        missed: lookout.missed + 1,
+        target: nil,
+        stand: nil
+    }
+
     %{lookout | open: Enum.reject(lookout.open, &tried?(lookout, &1))}
   end
 
