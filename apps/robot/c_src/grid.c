@@ -99,6 +99,20 @@ void grid_clearance(const uint8_t *cells, int64_t width, int64_t height, double 
     }
 }
 
+void grid_overlay(uint8_t *clear, int64_t width, int64_t height, const uint8_t *over, int64_t over_width,
+                  int64_t over_height, int64_t left, int64_t low)
+{
+    int64_t from = left > 0 ? left : 0, to = left + over_width < width ? left + over_width : width;
+    int64_t high = low + over_height < height ? low + over_height : height;
+
+    for (int64_t y = low > 0 ? low : 0; y < high; y++)
+        for (int64_t x = from; x < to; x++) {
+            uint8_t least = over[(y - low) * over_width + x - left];
+            if (least < clear[y * width + x])
+                clear[y * width + x] = least;
+        }
+}
+
 /* --- Discs. */
 
 static int64_t bound(double value, int64_t most)

@@ -31,6 +31,11 @@ size_t grid_clearance_scratch(int64_t width, int64_t height);
 void grid_clearance(const uint8_t *cells, int64_t width, int64_t height, double cell, int closed,
                     void *scratch, uint8_t *clear);
 
+/* Lowers the clearances of `clear` to those of `over`, a window (over_width x over_height) whose lower left cell is at
+   (left, low) of it, where that lies within. */
+void grid_overlay(uint8_t *clear, int64_t width, int64_t height, const uint8_t *over, int64_t over_width,
+                  int64_t over_height, int64_t left, int64_t low);
+
 /* A disc in cells: the centre of the first cell is at 0.5, 0.5. */
 typedef struct {
     double x, y, radius;

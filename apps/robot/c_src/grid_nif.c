@@ -48,6 +48,25 @@ static ERL_NIF_TERM clearance(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[
     return result;
 }
 
+/* overlay(clear, width, height, over, over_width, over_height, left, low) */
+static ERL_NIF_TERM overlay(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
+{
+    ErlNifBinary clear, over;
+    int64_t width, height, over_width, over_height;
+    int left, low;
+    ERL_NIF_TERM result;
+
+    if (argc != 8 || !enif_inspect_binary(env, argv[0], &clear) ||
+        !get_size(env, argv[1], argv[2], clear.size, &width, &height) || !enif_inspect_binary(env, argv[3], &over) ||
+        !get_size(env, argv[4], argv[5], over.size, &over_width, &over_height) || !enif_get_int(env, argv[6], &left) ||
+        !enif_get_int(env, argv[7], &low))
+        return enif_make_badarg(env);
+    uint8_t *lowered = enif_make_new_binary(env, clear.size, &result);
+    memcpy(lowered, clear.data, clear.size);
+    grid_overlay(lowered, width, height, over.data, over_width, over_height, left, low);
+    return result;
+}
+
 static int sane(const grid_disc *discs, size_t count)
 {
     for (size_t k = 0; k < count; k++)
@@ -102,6 +121,7 @@ static ERL_NIF_TERM way(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 static ErlNifFunc functions[] = {
     {"loaded?", 0, loaded, 0},
     {"clearance", 5, clearance, ERL_NIF_DIRTY_JOB_CPU_BOUND},
+    {"overlay", 8, overlay, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"way", 7, way, ERL_NIF_DIRTY_JOB_CPU_BOUND},
 };
 

@@ -118,6 +118,23 @@ int main(void)
         for (int64_t k = 0; k < cells; k++)
             CHECK(clear[k] == brute(walls, width, height, k % width, k / width, cell, closed));
 
+        /* Walls laid over others leave the lesser clearance, and nothing is read or written beyond a window that juts out. */
+        int64_t over_width = 1 + draw(24), over_height = 1 + draw(24), left = (int64_t)draw(60) - 30;
+        int64_t low = (int64_t)draw(60) - 30;
+        uint8_t *over = exactly((size_t)(over_width * over_height)), *both = exactly((size_t)cells);
+        for (int64_t k = 0; k < over_width * over_height; k++)
+            over[k] = (uint8_t)draw(256);
+        memcpy(both, clear, (size_t)cells);
+        grid_overlay(both, width, height, over, over_width, over_height, left, low);
+        for (int64_t k = 0; k < cells; k++) {
+            int64_t i = k % width - left, j = k / width - low;
+            int within = i >= 0 && j >= 0 && i < over_width && j < over_height;
+            uint8_t expected = within && over[j * over_width + i] < clear[k] ? over[j * over_width + i] : clear[k];
+            CHECK(both[k] == expected);
+        }
+        free(over);
+        free(both);
+
         grid_disc discs[3];
         size_t count = draw(4);
         for (size_t k = 0; k < count; k++)

@@ -254,17 +254,22 @@ defmodule Robot.Localiser do
     end
   end
 
-  # A plan is in the frame of the start poses, and in that of a leader that knows where it is in there.
-  defp hear(%{anchors: %{walls?: true}} = localiser, percept) do
-    if planned?(localiser.frame) do
+  @doc """
+  Whether it corrects the pose by the walls of a floor plan, where there is one. That is in the frame of the start poses,
+  and in that of a leader that knows where it is in there.
+  """
+  @spec by_walls?(t()) :: boolean()
+  def by_walls?(%__MODULE__{frame: frame, anchors: anchors}),
+    do: anchors.walls? and planned?(frame)
+
+  defp hear(localiser, percept) do
+    if by_walls?(localiser) do
       {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
       %{localiser | walls: walls, belief: belief}
     else
       %{localiser | walls: %Walls{}}
     end
   end
-
-  defp hear(localiser, _percept), do: %{localiser | walls: %Walls{}}
 
   defp planned?(nil), do: true
   defp planned?(%{start: {position, heading}}), do: position <= @planned and heading <= @aligned

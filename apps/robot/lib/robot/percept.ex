@@ -23,7 +23,8 @@ defmodule Robot.Percept do
                 detections: nil,
                 peers: %{},
                 driving: nil,
-                grid: nil
+                grid: nil,
+                ways: nil
               ]
 
   @typedoc """
@@ -70,7 +71,8 @@ defmodule Robot.Percept do
   @typedoc """
   `detections` are the blobs of the newest picture. `driving` is the speed that the gate last let
   through, and the limits that it applied. `grid` is what the robot knows of
-  walls, by a floor plan or by its sonars (`Robot.Navigation.OccupancyGrid`), `nil` for nothing.
+  walls, by a floor plan or by its sonars (`Robot.Navigation.OccupancyGrid`), `nil` for nothing; `ways` is the floor plan
+  with what its sonars have seen besides (`Robot.Navigation.KnownWalls`), `nil` if that is nothing.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -87,6 +89,7 @@ defmodule Robot.Percept do
           detections: Vision.Detections.t() | nil,
           peers: %{atom() => peer()},
           driving: %{twist: Twist.t(), limits: [atom()]} | nil,
-          grid: Robot.Navigation.Grid.t() | nil
+          grid: Robot.Navigation.Grid.t() | nil,
+          ways: Robot.Navigation.Grid.t() | nil
         }
 end

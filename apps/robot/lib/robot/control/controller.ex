@@ -17,7 +17,7 @@ defmodule Robot.Control.Controller do
   alias Hal.Profile
   alias Robot.{Localiser, Mission, Percept, Wish}
   alias Robot.Behaviour.Arbiter
-  alias Robot.Navigation.{Grid, OccupancyGrid}
+  alias Robot.Navigation.{Grid, KnownWalls}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
   @most_corners 50
@@ -34,7 +34,7 @@ defmodule Robot.Control.Controller do
                 percept: nil,
                 look: nil,
                 behaviour_looks?: false,
-                plan: nil,
+                walls: %KnownWalls{},
                 discs: []
               ]
 
@@ -51,7 +51,7 @@ defmodule Robot.Control.Controller do
           percept: Percept.t() | nil,
           look: float() | nil,
           behaviour_looks?: boolean(),
-          plan: Grid.t() | OccupancyGrid.t() | nil,
+          walls: KnownWalls.t(),
           discs: [{x :: float(), y :: float(), radius :: float()}]
         }
 
@@ -73,7 +73,7 @@ defmodule Robot.Control.Controller do
           escape: Escape.new([]),
           rest: Rest.new([]),
           localiser: options[:start] && Localiser.new(options[:start], options[:departed]),
-          plan: options[:plan]
+          walls: KnownWalls.new(options[:plan])
         }
 
       other ->
@@ -152,14 +152,13 @@ defmodule Robot.Control.Controller do
         ]
   def report(%__MODULE__{} = before, %__MODULE__{percept: %Percept{} = percept} = now) do
     walls = walls(now)
-    tick = {:tick, %{percept | grid: nil}}
+    tick = {:tick, %{percept | grid: nil, ways: nil}}
     if walls == walls(before), do: [tick], else: [{:walls, Grid.Packed.pack(walls)}, tick]
   end
 
   @doc "What the robot knows of walls, as the percept of the last tick has it; `nil` for nothing."
   @spec walls(t()) :: Grid.t() | nil
-  def walls(%__MODULE__{plan: %OccupancyGrid{} = sensed}), do: OccupancyGrid.grid(sensed)
-  def walls(%__MODULE__{plan: plan}), do: plan
+  def walls(%__MODULE__{walls: walls}), do: KnownWalls.known(walls)
 
   @doc "The fault for which the robot stands, in one line for people; `nil` without one."
   @spec fault(t()) :: String.t() | nil
@@ -242,23 +241,14 @@ defmodule Robot.Control.Controller do
     do: {percept, %{controller | percept: percept}}
 
   defp locate(controller, percept) do
-    {percept, localiser} = Localiser.update(controller.localiser, given(percept, controller.plan))
-    plan = sense(controller.plan, percept, controller.discs)
-    controller = %{controller | localiser: localiser, plan: plan}
-    percept = %{percept | grid: walls(controller)}
-    {percept, %{controller | percept: percept}}
+    # What its sonars have seen follows from its pose, and cannot correct it, but it tells whom walls hide.
+    given = %{percept | grid: walls(controller)}
+    {percept, localiser} = Localiser.update(controller.localiser, given)
+    plan? = Localiser.by_walls?(localiser)
+    walls = KnownWalls.update(controller.walls, percept, controller.discs, plan?)
+    percept = %{percept | grid: KnownWalls.known(walls), ways: KnownWalls.ways(walls)}
+    {percept, %{controller | localiser: localiser, walls: walls, percept: percept}}
   end
-
-  # What its sonars have seen follows from its pose, and cannot correct it, but it tells whom walls hide.
-  defp given(percept, %OccupancyGrid{} = sensed),
-    do: %{percept | grid: OccupancyGrid.grid(sensed)}
-
-  defp given(percept, plan), do: %{percept | grid: plan}
-
-  defp sense(%OccupancyGrid{} = sensed, percept, discs),
-    do: OccupancyGrid.update(sensed, percept, discs)
-
-  defp sense(plan, _percept, _discs), do: plan
 
   defp run(nil, _percept), do: {nil, nil, nil}
 

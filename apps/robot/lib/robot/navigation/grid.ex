@@ -100,6 +100,35 @@ defmodule Robot.Navigation.Grid do
     end
   end
 
+  @doc """
+  The grid with the walls of another one, a window of cells that lie on its own, as its walls too: each cell has the lesser
+  clearance.
+
+      iex> grid = Robot.Navigation.Grid.new(<<0, 0, 0, 0, 0>>, {5, 1}, 0.1, {0.0, 0.0}, closed?: false)
+      iex> window = Robot.Navigation.Grid.new(<<0, 1>>, {2, 1}, 0.1, {0.2, 0.0}, closed?: false)
+      iex> for <<c <- Robot.Navigation.Grid.overlay(grid, window).clear>>, do: c
+      [255, 255, 1, 0, 255]
+  """
+  @spec overlay(t(), window :: t()) :: t()
+  def overlay(%__MODULE__{} = grid, window) do
+    {left, low} = index(grid, {window.left + grid.cell / 2, window.low + grid.cell / 2})
+    {width, height} = {grid.width, grid.height}
+
+    clear =
+      kernel().overlay(
+        grid.clear,
+        width,
+        height,
+        window.clear,
+        window.width,
+        window.height,
+        left,
+        low
+      )
+
+    %{grid | clear: clear}
+  end
+
   @doc "The clearance at a point: not more than its distance to the nearest wall, in metres."
   @spec clearance(t(), Pose.point()) :: float()
   def clearance(grid, point), do: @unit * units(grid, point)

@@ -47,6 +47,38 @@ defmodule Robot.Navigation.GridTest do
     end
   end
 
+  test "a window laid over a grid in C is that of the reference, also where it juts out" do
+    for _ <- 1..150 do
+      [{over, wide, high}, {clear, width, height}] =
+        for {cells, width, height} <- [cells(), cells()],
+            do: {Reference.clearance(cells, width, height, 0.1, false), width, height}
+
+      {left, low} = {:rand.uniform(60) - 30, :rand.uniform(60) - 30}
+      arguments = [clear, width, height, over, wide, high, left, low]
+      assert apply(Native, :overlay, arguments) == apply(Reference, :overlay, arguments)
+    end
+
+    assert_raise ArgumentError, fn -> Native.overlay(<<1>>, 1, 1, <<1>>, 2, 1, 0, 0) end
+    assert_raise ArgumentError, fn -> Native.overlay(<<1>>, 2, 1, <<1>>, 1, 1, 0, 0) end
+  end
+
+  test "walls laid over a grid leave the clearances of a grid with all of them" do
+    for _ <- 1..50 do
+      {cells, width, height} = cells()
+      more = for _ <- 1..(width * height), into: <<>>, do: <<div(:rand.uniform(20), 20)>>
+
+      both =
+        for {a, b} <- Enum.zip(:binary.bin_to_list(cells), :binary.bin_to_list(more)),
+            into: <<>>,
+            do: <<max(a, b)>>
+
+      [plan, window, all] =
+        for walls <- [cells, more, both], do: Grid.new(walls, {width, height}, 0.1, {-1.3, 2.2})
+
+      assert Grid.overlay(plan, window) == all
+    end
+  end
+
   test "the kernel refuses sizes that are not those of its cells" do
     for {cells, width, height} <- [
           {<<0>>, 2, 1},

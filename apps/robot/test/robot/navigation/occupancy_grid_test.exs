@@ -1,7 +1,7 @@
 defmodule Robot.Navigation.OccupancyGridTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.Navigation.{Grid, OccupancyGrid}
+  alias Robot.Navigation.{Grid, KnownWalls, OccupancyGrid}
   alias Robot.Navigation.OccupancyGrid.{Native, Reference}
   alias Robot.Percept
   doctest Robot.Navigation.Grid.Packed
@@ -259,6 +259,80 @@ defmodule Robot.Navigation.OccupancyGridTest do
 
     later = percept(10_000 + 200_000, Pose.new(0, 2), silent)
     assert grid |> OccupancyGrid.update(later, []) |> OccupancyGrid.grid() == nil
+  end
+
+  describe "with a floor plan" do
+    # A wall at x = 1 with a door in it, its cells not those of the window.
+    defp plan do
+      {left, low} = {-2.03, -4.02}
+
+      cells =
+        for j <- 0..79, i <- 0..49, into: <<>> do
+          {x, y} = {left + (i + 0.5) * 0.1, low + (j + 0.5) * 0.1}
+          <<if(x > 1.0 and x < 1.1 and abs(y) > 0.6, do: 1, else: 0)>>
+        end
+
+      Grid.new(cells, {50, 80}, 0.1, {left, low}, closed?: true)
+    end
+
+    defp know(walls, options \\ []) do
+      for k <- 0..100, reduce: KnownWalls.new(plan()) do
+        known ->
+          pose = Pose.new(0.3, -2 + k * 0.04, :math.pi() / 2)
+          percept = percept(k * 100, pose, ranges(pose, walls), options)
+          percept = %{percept | uncertainty: %{radius: options[:unsure] || 0.1}}
+          KnownWalls.update(known, percept, options[:discs] || [])
+      end
+    end
+
+    test "what it shows is not kept again" do
+      known = know(@door)
+      assert KnownWalls.known(known) == plan()
+      assert KnownWalls.ways(known) == nil
+      assert known.sensed.cells == nil
+    end
+
+    test "a door that is shut is a wall for ways alone" do
+      known = know([{1.0, -4.0, 4.0}])
+      assert KnownWalls.known(known) == plan()
+      ways = KnownWalls.ways(known)
+      elsewhere = percept(12_000, Pose.new(0.3, 2), nil)
+      assert known |> KnownWalls.update(elsewhere, [], false) |> KnownWalls.ways() == nil
+      assert {ways.width, ways.left, ways.closed?} == {50, -2.03, true}
+      assert Grid.passes?(plan(), {0.3, 0.0}, {2.0, 0.0}, 0.23)
+      assert Grid.Way.find(ways, {0.3, 0.0}, {2.0, 0.0}, 0.23) == nil
+      # Nothing is added but in the door.
+      for <<was, now <- interleave(plan().clear, ways.clear)>>, do: assert(now <= was)
+      assert Grid.clearance(ways, {-1.5, -3.0}) == Grid.clearance(plan(), {-1.5, -3.0})
+    end
+
+    test "a robot that may be elsewhere takes no wall for something else" do
+      off = for {x, low, high} <- @door, do: {x - 0.35, low, high}
+      assert KnownWalls.ways(know(off)) != nil
+      assert KnownWalls.ways(know(off, unsure: 0.5)) == nil
+    end
+
+    test "bodies that are known are nothing else, and what is long ago is forgotten whole" do
+      body = [{0.9, -0.15, 0.15}]
+      known = know(body)
+      assert KnownWalls.ways(known) != nil
+      assert KnownWalls.ways(know(body, discs: [{1.1, 0.0, 0.2}])) == nil
+
+      silent = List.duplicate(5.1, 16)
+      learnt = percept(12_000, Pose.new(0.3, 2.1), silent)
+      assert known |> KnownWalls.update(learnt, [{1.1, 0.0, 0.2}]) |> KnownWalls.ways() == nil
+      assert known |> KnownWalls.update(learnt, []) |> KnownWalls.ways() != nil
+
+      later = percept(10_000 + 181_000, Pose.new(0.3, 2), silent)
+      known = KnownWalls.update(known, later, [])
+      assert {KnownWalls.ways(known), known.sensed.cells} == {nil, nil}
+    end
+
+    defp interleave(a, b) do
+      for {x, y} <- Enum.zip(:binary.bin_to_list(a), :binary.bin_to_list(b)),
+          into: <<>>,
+          do: <<x, y>>
+    end
   end
 
   test "without a pose or odometry nothing changes" do

@@ -118,32 +118,36 @@ defmodule Robot.Behaviour.Avoid.Route do
   defp again_ms(%{way?: way?}), do: if(way?, do: @again_ms, else: @walled_ms)
 
   # The way past the bodies, if no wall stands in it; else one past walls and bodies, or past the walls and those bodies
-  # that do not move, or past the walls alone; `nil` if there is none.
-  defp past_walls(corners, from, goal, %{grid: grid} = percept, bodies) do
-    own = percept.profile.radius
-
+  # that do not move, or past the walls alone; `nil` if there is none. What only sonars saw may be gone: if it leaves no
+  # way, the robot goes by the plan, and looks again.
+  defp past_walls(corners, from, goal, %{grid: grid, ways: ways} = percept, bodies) do
     if no_wall?(corners, from, percept) do
       corners
     else
-      way = fn discs, margin -> Grid.Way.find(grid, from, goal, own + margin, discs) end
+      (ways && round_walls(ways, from, goal, percept.profile.radius, bodies)) ||
+        round_walls(grid, from, goal, percept.profile.radius, bodies)
+    end
+  end
 
-      # Most places that cannot be reached are behind walls: one search tells.
-      with [_ | _] = loosest <- way.([], @by_wall) do
-        Enum.find_value(
-          for(discs <- Enum.uniq(bodies), margin <- [@from_wall, @by_wall], do: {discs, margin}),
-          fn
-            {[], @by_wall} -> loosest
-            {discs, margin} -> way.(discs, margin)
-          end
-        )
-      end
+  defp round_walls(grid, from, goal, own, bodies) do
+    way = fn discs, margin -> Grid.Way.find(grid, from, goal, own + margin, discs) end
+
+    # Most places that cannot be reached are behind walls: one search tells.
+    with [_ | _] = loosest <- way.([], @by_wall) do
+      Enum.find_value(
+        for(discs <- Enum.uniq(bodies), margin <- [@from_wall, @by_wall], do: {discs, margin}),
+        fn
+          {[], @by_wall} -> loosest
+          {discs, margin} -> way.(discs, margin)
+        end
+      )
     end
   end
 
   defp no_wall?(_corners, _from, %{grid: nil}), do: true
 
   defp no_wall?([place | rest], from, %{grid: grid, profile: profile} = percept) do
-    Grid.passes?(grid, from, place, profile.radius + @by_wall) and
+    Grid.passes?(percept.ways || grid, from, place, profile.radius + @by_wall) and
       no_wall?(rest, place, percept)
   end
 

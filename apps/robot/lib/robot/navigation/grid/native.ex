@@ -7,6 +7,19 @@ defmodule Robot.Navigation.Grid.Native do
   @spec clearance(binary(), pos_integer(), pos_integer(), float(), boolean()) :: binary()
   def clearance(_cells, _width, _height, _cell, _closed?), do: :erlang.nif_error(:nif_not_loaded)
 
+  @spec overlay(
+          binary(),
+          pos_integer(),
+          pos_integer(),
+          over :: binary(),
+          pos_integer(),
+          pos_integer(),
+          left :: integer(),
+          low :: integer()
+        ) :: binary()
+  def overlay(_clear, _width, _height, _over, _over_width, _over_height, _left, _low),
+    do: :erlang.nif_error(:nif_not_loaded)
+
   @spec way(
           binary(),
           pos_integer(),

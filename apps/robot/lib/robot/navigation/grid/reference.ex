@@ -41,6 +41,28 @@ defmodule Robot.Navigation.Grid.Reference do
     <<units |> trunc() |> max(1) |> min(@most)>>
   end
 
+  @doc "See `Robot.Navigation.Grid.overlay/2`: the window's lower left cell is at `{left, low}`."
+  @spec overlay(
+          binary(),
+          pos_integer(),
+          pos_integer(),
+          binary(),
+          pos_integer(),
+          pos_integer(),
+          integer(),
+          integer()
+        ) :: binary()
+  def overlay(clear, width, height, over, over_width, over_height, left, low) do
+    for y <- 0..(height - 1), x <- 0..(width - 1), into: <<>> do
+      before = :binary.at(clear, y * width + x)
+      {i, j} = {x - left, y - low}
+
+      if i in 0..(over_width - 1) and j in 0..(over_height - 1),
+        do: <<min(before, :binary.at(over, j * over_width + i))>>,
+        else: <<before>>
+    end
+  end
+
   @doc "See `Robot.Navigation.Grid.Way.find/5`: A* with the octile distance."
   @spec way(
           binary(),

@@ -4,6 +4,7 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
   cells of 10 cm. Pure.
   """
   alias Hal.Pose
+  alias Robot.Navigation.Grid
   alias Robot.Percept
 
   @cell 0.1
@@ -26,6 +27,9 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
   @blurred 0.2
   # An echo this near (metres) to a known body is its echo.
   @explained 0.3
+  # A wall of the floor plan that is within this distance (metres), and how unsure the robot is of its place, of a cone up
+  # to its echo may have sent it.
+  @by_wall 0.1
 
   @type disc :: {x :: float(), y :: float(), radius :: float()}
   @typedoc "The numbers of the cell in a grid's lower left corner, from that of the frame's origin."
@@ -58,21 +62,27 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
     do: Pose.distance(before, now) > way or abs(Pose.wrap(before.heading - now.heading)) > turn
 
   @doc """
-  The cones of a robot at this pose. An echo that one of the `known` bodies explains is no wall; `off` is how far
-  (metres) that may be from where it is supposed to be.
+  The cones of a robot at this pose. An echo that one of the `known` bodies explains is no wall, nor is one that a wall of
+  the `plan` (map frame) explains; `off` is how far (metres) these may be from where they are supposed to be.
   """
-  @spec pack(Percept.t(), Pose.t(), [disc()], corner(), off :: float()) :: binary()
-  def pack(%Percept{profile: profile, sonar: ranges}, pose, known, corner, off \\ 0.0) do
+  @spec pack(Percept.t(), Pose.t(), [disc()], corner(), off :: float(), Grid.t() | nil) ::
+          binary()
+  def pack(%Percept{profile: profile} = percept, pose, known, corner, off \\ 0.0, plan \\ nil) do
     tangent = :math.tan(profile.sonar_cone / 2)
     near = @explained + off
 
-    for {sonar, range} <- Enum.zip(profile.sonars, ranges),
+    for {sonar, range} <- Enum.zip(profile.sonars, percept.sonar),
         is_number(range) and range > profile.sonar_min + 0.005,
         into: <<>> do
       {x, y} = Pose.place(pose, {sonar.x, sonar.y})
       heading = pose.heading + sonar.heading
       {c, s} = {:math.cos(heading), :math.sin(heading)}
-      known? = Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent, near))
+
+      known? =
+        Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent, near)) or
+          (plan != nil and range <= @heard and
+             by_wall?(plan, percept.pose, sonar, range, tangent, off))
+
       {clear, echo} = reading(range, profile, known?)
       {px, py} = in_cells({x, y}, corner)
 
@@ -87,6 +97,52 @@ defmodule Robot.Navigation.OccupancyGrid.Cones do
 
   defp reading(range, _profile, false),
     do: {min(range - @margin, @through), if(range <= @heard, do: 1.0, else: 0.0)}
+
+  @doc """
+  Whether an echo is one that neither a wall of the `plan` nor one of the `known` bodies (frame of the odometry) explains, as
+  in `pack/6`.
+  """
+  @spec surprise?(Percept.t(), [disc()], off :: float(), Grid.t()) :: boolean()
+  def surprise?(%Percept{profile: profile} = percept, known, off, plan) do
+    tangent = :math.tan(profile.sonar_cone / 2)
+
+    profile.sonars
+    |> Enum.zip(percept.sonar)
+    |> Enum.any?(fn {sonar, range} ->
+      is_number(range) and range > profile.sonar_min + 0.005 and range <= @heard and
+        not by_wall?(plan, percept.pose, sonar, range, tangent, off) and
+        not by_body?(known, Pose.compose(percept.odometry.pose, sonar), range, tangent, off)
+    end)
+  end
+
+  defp by_body?(known, %Pose{x: x, y: y, heading: heading}, range, tangent, off) do
+    {c, s} = {:math.cos(heading), :math.sin(heading)}
+    Enum.any?(known, &sent?(&1, x, y, c, s, range, tangent, @explained + off))
+  end
+
+  # Whether the plan has a wall in the cone up to the echo, or beside it.
+  defp by_wall?(plan, pose, sonar, range, tangent, off) do
+    %Pose{x: x, y: y, heading: heading} = Pose.compose(pose, sonar)
+    along = {:math.cos(heading), :math.sin(heading)}
+    by_wall?(plan, {x, y}, along, range, tangent, @by_wall + off, 0.0)
+  end
+
+  # As far as the walls are away nothing need be looked at.
+  defp by_wall?(plan, {x, y} = from, {c, s} = along, range, tangent, beside, way) do
+    spare = Grid.clearance(plan, {x + way * c, y + way * s}) - way * tangent - beside
+
+    cond do
+      spare < 0.0 ->
+        true
+
+      way >= range ->
+        false
+
+      true ->
+        next = way + max(spare / (1.0 + tangent), plan.cell / 2)
+        by_wall?(plan, from, along, range, tangent, beside, min(next, range))
+    end
+  end
 
   @doc "Whether an echo of this range (metres), heard by a sonar at this pose with a cone of this width, can come from a disc."
   @spec sent?(disc(), Pose.t(), range :: float(), cone :: float()) :: boolean()
