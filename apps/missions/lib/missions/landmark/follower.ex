@@ -45,6 +45,8 @@ defmodule Missions.Landmark.Follower do
   # the slot was, and this robot sees it move by what its pose is corrected by, too.
   @elsewhere 1.2
   @here 0.1
+  # Nor does one whose wheels have not taken it this far (metres), whatever its pose is corrected by.
+  @moved 0.2
 
   defstruct in_place?: false,
             unsure?: false,
@@ -60,6 +62,7 @@ defmodule Missions.Landmark.Follower do
             best: nil,
             best_ms: 0,
             obstacle_ms: nil,
+            stopped: nil,
             stood?: false
 
   @typedoc """
@@ -67,6 +70,7 @@ defmodule Missions.Landmark.Follower do
   where the landmark stood when this robot was last in place. `best` is the least distance to
   `slot` so far, and `best_ms` when it was reached; something unknown has stood in the slot since
   `obstacle_ms`. `late` is the same, ignoring small moves of the slot: from each place where it was, how the robot has come nearer since.
+  By its wheels it has been where it `stopped`, since when.
   A robot that has `stood?` in its slot may be pushed off it, but knows that there is room.
   `blocker` is what blocks a blocked robot. `facing` is the heading in which it stands in a slot to make sure of its place, and it
   has been unsure since `unsure_ms`.
@@ -86,6 +90,7 @@ defmodule Missions.Landmark.Follower do
           best: float() | nil,
           best_ms: integer(),
           obstacle_ms: integer() | nil,
+          stopped: {frame :: reference() | nil, Pose.t(), since_ms :: integer()} | nil,
           stood?: boolean()
         }
 
@@ -233,21 +238,29 @@ defmodule Missions.Landmark.Follower do
   # Farther away, or if the slot trembles, only time shows that a robot makes no progress.
   defp late(%{in_place?: in_place?, unsure?: unsure?} = follower, _mission, _slot, _error)
        when in_place? or unsure?,
-       do: %{follower | late: [], blocker: nil}
+       do: %{follower | late: [], stopped: nil, blocker: nil}
 
   defp late(follower, %{now_ms: now} = mission, slot, error) do
     late = patience(follower.late, slot, error, now)
     gain = gain(mission.percept)
     stale? = fn {_place, patience} -> Patience.stale?(patience, gain, @late_ms) end
-    blocked? = follower.blocked? or Enum.any?(late, stale?)
+    {_frame, _pose, since_ms} = stopped = stopped(follower.stopped, mission.percept.odometry, now)
+    blocked? = follower.blocked? or now - since_ms >= @late_ms or Enum.any?(late, stale?)
 
     %{
       follower
       | late: late,
+        stopped: stopped,
         blocked?: blocked?,
         blocker: blocker(follower, mission, slot, blocked?)
     }
   end
+
+  defp stopped({frame, pose, _since_ms} = stopped, %{frame: frame, pose: now_at}, now) do
+    if Pose.distance(pose, now_at) <= @moved, do: stopped, else: {frame, now_at, now}
+  end
+
+  defp stopped(_none, odometry, now), do: {odometry.frame, odometry.pose, now}
 
   defp patience(late, slot, error, now) do
     late =

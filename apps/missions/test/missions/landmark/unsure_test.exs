@@ -29,8 +29,8 @@ defmodule Missions.Landmark.UnsureTest do
   defp stand(off, radius, seconds, grid \\ nil),
     do: watch(fn _seconds -> off end, radius, seconds, grid)
 
-  # The same of one that comes nearer by its own estimate: `off` is a function of the seconds.
-  defp watch(off, radius, seconds, grid \\ nil) do
+  # The same of one that comes nearer: `off` is a function of the seconds. Its wheels turn as it does, or not.
+  defp watch(off, radius, seconds, grid \\ nil, wheels \\ :turn) do
     mission = mission(phase: :follow, leader: :mag1, epoch: 1, follower: Follower.new())
 
     uncertainty = %{
@@ -57,7 +57,9 @@ defmodule Missions.Landmark.UnsureTest do
         still: true
       }
 
-      percept = percept(at_ms: now, uncertainty: uncertainty, grid: grid)
+      driven = if wheels == :turn, do: off.(0.0) - off.(tick / 10), else: 0.0
+      odometry = %Odometry{pose: Pose.new(driven, 0), twist: Twist.zero()}
+      percept = percept(at_ms: now, uncertainty: uncertainty, grid: grid, odometry: odometry)
       mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
       {mission, _effects} = Follower.act(mission)
       mission
@@ -134,6 +136,13 @@ defmodule Missions.Landmark.UnsureTest do
   test "a robot that drives is not blocked, however unsure it is of its place" do
     for seconds <- 1..25,
         do: assert(%{blocked?: false} = watch(&(6.0 - 0.2 * &1), 12.0, seconds))
+  end
+
+  test "a robot whose wheels stand is blocked, however its pose is corrected" do
+    off = &(3.0 - 0.1 * &1)
+    assert %{blocked?: false} = watch(off, 0.1, 14, nil, :stand)
+    assert %{blocked?: true} = watch(off, 0.1, 16, nil, :stand)
+    assert %{blocked?: false} = watch(off, 0.1, 16)
   end
 
   test "the shape does not close up for an unsure robot, and closes up for a blocked one in spite of it" do
