@@ -1,5 +1,6 @@
 defmodule Console.DemoTest do
-  use ExUnit.Case, async: true
+  # It captures what goes to stderr, which is one device for all tests.
+  use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.{Demo, FakeTrial, Runs}
 

@@ -1,5 +1,6 @@
 defmodule Console.ScenarioTest do
-  use ExUnit.Case, async: true
+  # It captures what goes to stderr, which is one device for all tests.
+  use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.Scenario.{Options, Session}
   doctest Console.Scenario.Options
