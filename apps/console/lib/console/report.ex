@@ -115,7 +115,8 @@ defmodule Console.Report do
   end
 
   defp outcome(%{leader: nil} = result, _formed?),
-    do: "No formation: #{Format.count(result.robots, "robot")}, and none of them leads."
+    do:
+      "No formation: #{Format.count(result.robots, "robot")}, and none of them leads.#{said(result)}"
 
   defp outcome(%{formation: formation} = result, true) do
     living = Enum.count(result.fleet, & &1.alive)
@@ -136,6 +137,14 @@ defmodule Console.Report do
 
     ": " <>
       Enum.map_join(told, "; ", &"#{&1.name} is not done (#{&1.says || &1.state})") <> more <> "."
+  end
+
+  # What those who look for a landmark say of that; most of them say the same.
+  defp said(%{fleet: fleet}) do
+    for [%{says: says} | _] = robots when says != nil <-
+          fleet |> Enum.filter(& &1.alive) |> Enum.sort_by(& &1.says) |> Enum.chunk_by(& &1.says),
+        into: "",
+        do: " #{Enum.map_join(robots, ", ", & &1.name)}: #{says}."
   end
 
   defp seen(%{seen: %{area_m2: area_m2, share: share}}) do

@@ -39,6 +39,14 @@ defmodule Console.DemoTest do
     assert text =~ "No formation"
   end
 
+  test "without a leader, it says what those who looked for the landmark have looked at" do
+    options =
+      Runs.options("--map doorway --robots 2 --landmark none --duration 90 --blobs direct")
+
+    assert {2, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+    assert text =~ ~r/ mag1, min1: no landmark: has looked at all that it can reach, \d+ m²\./
+  end
+
   test "refuses in one line the options that the trial refuses" do
     options = %{Runs.options("") | map: "nowhere"}
 

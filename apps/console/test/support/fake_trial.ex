@@ -135,6 +135,7 @@ defmodule Console.FakeTrial do
             name: r.id,
             alive: r.alive,
             state: r.state,
+            says: nil,
             blocked_by: nil,
             x: r.pose.x,
             y: r.pose.y,
