@@ -9,12 +9,12 @@ defmodule Player.Validate do
   @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
 
   @doc "Keeps only values that are allowed one by one; `modules` are the drivers by kind."
-  @spec allowed(Player.Defaults.t(), %{atom() => module()}) :: Player.Defaults.t()
+  @spec allowed(Player.State.t(), %{atom() => module()}) :: Player.State.t()
   def allowed(state, modules) do
     for {path, value, _line, _option} = entry <- state.values,
         why = refused(path, value, modules),
         reduce: state do
-      state -> Player.Defaults.leave(state, &(&1 == entry), why)
+      state -> Player.State.leave(state, &(&1 == entry), why)
     end
   end
 

@@ -17,7 +17,17 @@ defmodule Player do
   Units are those of `Player.Units`. If a file says something else than it seems to mean, the
   assumption is reported as well.
   """
-  alias Player.{Boards, CameraOptions, Parts, RFlexOptions, Sections, Units, Unsupported}
+  alias Player.{
+    Boards,
+    CameraOptions,
+    Defaults,
+    Parts,
+    RFlexOptions,
+    Sections,
+    State,
+    Units,
+    Unsupported
+  }
 
   @drivers %{
     "rflex" => :drive,
@@ -31,15 +41,12 @@ defmodule Player do
   @modules %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
   @said ~w(name driver provides requires alwayson plugin key)
 
-  @typedoc "A line of the file, the option or section there, and a remark about it."
-  @type remark :: {line :: pos_integer(), what :: String.t(), why :: String.t()}
-
   @type result :: %{
           text: String.t(),
           id: atom(),
           profile: :magellan | :atrv_mini,
-          assumed: [remark()],
-          left: [remark()]
+          assumed: [State.remark()],
+          left: [State.remark()]
         }
 
   @doc """
@@ -98,10 +105,10 @@ defmodule Player do
 
     case {section.type, kind} do
       {"driver", nil} ->
-        leave(state, section, "driver #{name}", Unsupported.driver(name, names()))
+        left(state, section.line, "driver #{name}", Unsupported.driver(name, names()))
 
       {type, nil} ->
-        leave(state, section, type, Unsupported.section(type))
+        left(state, section.line, type, Unsupported.section(type))
 
       {_type, kind} ->
         first(kind, name, section, state, units)
@@ -118,12 +125,11 @@ defmodule Player do
     end
   end
 
-  defp leave(state, section, what, why),
-    do: %{state | left: [{section.line, what, why} | state.left]}
+  defp left(state, line, what, why), do: %{state | left: [{line, what, why} | state.left]}
 
   defp first(kind, name, section, state, units) do
     if kind in state.seen do
-      leave(state, section, "driver #{name}", "a robot has one #{kind}; the first is taken")
+      left(state, section.line, "driver #{name}", "a robot has one #{kind}; the first is taken")
     else
       state = %{state | seen: [kind | state.seen]}
 
@@ -163,14 +169,13 @@ defmodule Player do
   defp carry(state, _where, :used), do: state
 
   defp carry(state, {line, name}, {:ok, values}),
-    do: Player.Defaults.keep(state, line, name, values)
+    do: State.keep(state, line, name, values)
 
   defp carry(state, {line, name}, {:assumed, values, why}),
-    do:
-      state |> Player.Defaults.keep(line, name, values) |> Player.Defaults.assume(line, name, why)
+    do: state |> State.keep(line, name, values) |> State.assume(line, name, why)
 
   defp carry(state, {line, name}, {:left, why}),
-    do: %{state | left: [{line, name, why} | state.left]}
+    do: left(state, line, name, why)
 
   defp based(state) do
     cond do
@@ -188,8 +193,8 @@ defmodule Player do
 
   defp finish(state, options) do
     state = Player.Validate.allowed(state, @modules)
-    {profile, state} = Player.Defaults.profile(state, options[:profile])
-    state = state |> Player.Defaults.complete(profile) |> Boards.complete(profile)
+    {profile, state} = Defaults.profile(state, options[:profile])
+    state = state |> Defaults.complete(profile) |> Boards.complete(profile)
     {profile, coloured(state, options[:colours])}
   end
 
@@ -207,12 +212,12 @@ defmodule Player do
 
   # Without colours there is nothing for our camera to look for.
   defp coloured(state, read) do
-    file = Player.Defaults.value(state, [:colours, :file])
+    file = State.value(state, [:colours, :file])
 
     cond do
       file == nil ->
         blind? = &match?({[kind, _], _, _, _} when kind in [:camera, :colours], &1)
-        Player.Defaults.leave(state, blind?, "a camera needs a driver cmvision with a colorfile")
+        State.leave(state, blind?, "a camera needs a driver cmvision with a colorfile")
 
       read == nil ->
         state
@@ -223,12 +228,8 @@ defmodule Player do
   end
 
   defp looked(state, file, {path, result}) do
-    {_, _, line, option} = List.keyfind(state.values, [:colours, :file], 0)
-
-    values =
-      List.keyreplace(state.values, [:colours, :file], 0, {[:colours, :file], path, line, option})
-
-    state = %{state | values: values}
+    {at, _, line, option} = List.keyfind(state.values, [:colours, :file], 0)
+    state = %{state | values: List.keyreplace(state.values, at, 0, {at, path, line, option})}
 
     case result do
       {:ok, %{classes: [%{name: first} | _] = classes}} ->
@@ -236,18 +237,15 @@ defmodule Player do
           do: state,
           else:
             state
-            |> Player.Defaults.assume(
+            |> State.assume(
               line,
               file,
               "its first colour, #{first}, is taken for the landmark's"
             )
-            |> Player.Defaults.keep(line, option, [{[:policies, :colour], first}])
+            |> State.keep(line, option, [{[:policies, :colour], first}])
 
       {:error, why} ->
-        %{
-          state
-          | left: [{line, option, "the colour file must be corrected: #{why}"} | state.left]
-        }
+        left(state, line, option, "the colour file must be corrected: #{why}")
     end
   end
 end

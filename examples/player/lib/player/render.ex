@@ -1,6 +1,6 @@
 defmodule Player.Render do
   @moduledoc "Writes the text of a robot file from an imported Player configuration. Pure."
-  alias Robot.File.Writer
+  alias Player.{State, Writer}
 
   @order [:id, :profile, :body, :drive, :ptz, :camera, :colours, :limits, :start, :policies]
 
@@ -8,7 +8,7 @@ defmodule Player.Render do
   The text of the robot file: comments on its source and on what was assumed, then all keys;
   `modules` are the drivers.
   """
-  @spec write(Player.Defaults.t(), Path.t(), atom(), atom(), %{atom() => module()}) :: String.t()
+  @spec write(State.t(), Path.t(), atom(), atom(), %{atom() => module()}) :: String.t()
   def write(state, file, id, profile, modules) do
     nested =
       Enum.reduce(state.values, [], fn {path, value, _, _}, all -> nest(all, path, value) end)

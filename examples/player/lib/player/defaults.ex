@@ -2,35 +2,17 @@ defmodule Player.Defaults do
   @moduledoc """
   Values derived from several of Player's options or from its defaults: what its driver does by
   default, what one value implies for another, what does not fit the body. Pure.
-
-  The state is that of `Player`: values with the line and name of the option they came from,
-  what was assumed, what is left out.
   """
+  import Player.State
   alias Hal.Profile
-
-  @type entry :: {path :: [atom()], value :: term(), line :: pos_integer(), option :: String.t()}
-  @type t :: %{
-          values: [entry()],
-          assumed: [Player.remark()],
-          left: [Player.remark()],
-          seen: [atom()]
-        }
+  alias Player.State
 
   @echo_us 30_000
   # The same as in Robot.File.Odd.
   @slow_s 5.0
 
-  @doc "The value at a path, or `nil`."
-  @spec value(t(), [atom()]) :: term()
-  def value(state, path) do
-    case List.keyfind(state.values, path, 0) do
-      {_path, value, _line, _name} -> value
-      nil -> nil
-    end
-  end
-
   @doc "The kind of robot: the one asked for, or a guess from its sensors and shape."
-  @spec profile(t(), :magellan | :atrv_mini | nil) :: {:magellan | :atrv_mini, t()}
+  @spec profile(State.t(), :magellan | :atrv_mini | nil) :: {:magellan | :atrv_mini, State.t()}
   def profile(state, nil) do
     touches? = value(state, [:body, :irs]) != nil or (value(state, [:body, :bumpers]) || 0) > 0
 
@@ -50,7 +32,7 @@ defmodule Player.Defaults do
   def profile(state, profile), do: {profile, state}
 
   @doc "Keeps and completes what fits a body of that kind."
-  @spec complete(t(), :magellan | :atrv_mini) :: t()
+  @spec complete(State.t(), :magellan | :atrv_mini) :: State.t()
   def complete(state, kind) do
     body = apply(Profile, kind, [])
 
@@ -62,25 +44,6 @@ defmodule Player.Defaults do
     |> touchless(kind)
     |> circled(body)
     |> limited(body)
-  end
-
-  @doc "Adds a remark on something that was assumed."
-  @spec assume(t(), pos_integer(), String.t(), String.t()) :: t()
-  def assume(state, line, what, why), do: %{state | assumed: [{line, what, why} | state.assumed]}
-
-  @doc "Adds further values that follow from an option in a line."
-  @spec keep(t(), pos_integer(), String.t(), [{[atom()], term()}]) :: t()
-  def keep(state, line, name, values) do
-    new = for {path, value} <- values, do: {path, value, line, name}
-    %{state | values: state.values ++ new}
-  end
-
-  @doc "Leaves out the values at some paths, and says why."
-  @spec leave(t(), (entry() -> boolean()), String.t()) :: t()
-  def leave(state, which, why) do
-    {gone, values} = Enum.split_with(state.values, which)
-    left = for {_path, _value, line, option} <- gone, do: {line, option, why}
-    %{state | values: values, left: Enum.uniq(left) ++ state.left}
   end
 
   defp ported(state) do
@@ -163,27 +126,23 @@ defmodule Player.Defaults do
     length = value(state, [:body, :length]) || body.length
     width = value(state, [:body, :width]) || body.width
 
-    cond do
-      {length, width} == {body.length, body.width} ->
-        state
+    across =
+      if body.name == :magellan,
+        do: max(length, width),
+        else: :math.sqrt(length * length + width * width)
 
-      body.name == :magellan ->
-        keep(state, 1, "radius", [{[:body, :radius], Float.round(max(length, width) / 2, 3)}])
-
-      true ->
-        radius = Float.round(:math.sqrt(length * length + width * width) / 2, 3)
-        keep(state, 1, "radius", [{[:body, :radius], radius}])
-    end
+    if {length, width} == {body.length, body.width},
+      do: state,
+      else: keep(state, 1, "radius", [{[:body, :radius], Float.round(across / 2, 3)}])
   end
 
   # A limit may only be lower than what the body can do; a person should know how it brakes.
   defp limited(state, body) do
     with a when is_number(a) and a >= 0.01 and a < 0.2 <-
            value(state, [:limits, :max_acceleration]) do
-      {_, _, line, option} = List.keyfind(state.values, [:limits, :max_acceleration], 0)
       way = Float.round(body.max_linear * body.max_linear / (2 * a), 1)
       why = "taken as it is, but at full speed the robot then needs #{way} m to stop"
-      state |> assume(line, option, why) |> turned(body) |> lowered(body)
+      state |> assume([:limits, :max_acceleration], why) |> turned(body) |> lowered(body)
     else
       _well -> state |> turned(body) |> lowered(body)
     end
@@ -199,7 +158,7 @@ defmodule Player.Defaults do
           "with #{a} rad/s2 it would take #{seconds} s to reach full turn speed; " <>
             "Player does not use it, and #{body.max_turn_acceleration} is usual"
 
-        leave(state, &match?({[:limits, :max_turn_acceleration], _, _, _}, &1), why)
+        leave(state, [[:limits, :max_turn_acceleration]], why)
 
       _usual ->
         state
@@ -214,7 +173,7 @@ defmodule Player.Defaults do
       state ->
         leave(
           state,
-          &(elem(&1, 0) == path),
+          [path],
           "#{value} is not between 0.01 and #{most}, the range of a #{body.name}"
         )
     end

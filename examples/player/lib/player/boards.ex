@@ -1,9 +1,11 @@
 defmodule Player.Boards do
   @moduledoc """
   Works out the pose and the board of each sonar and infrared from several of Player's options.
-  Pure. The state is that of `Player.Defaults`.
+  Pure.
   """
+  import Player.State
   alias Hal.Profile
+  alias Player.State
 
   # Options that must not be guessed: they say where each sensor is, and a robot drives by its
   # sensors.
@@ -15,7 +17,7 @@ defmodule Player.Boards do
   error says which line was not, and why: a robot whose sensors are elsewhere than it thinks is
   worse than none.
   """
-  @spec sure(Player.Defaults.t()) :: :ok | {:error, {line :: pos_integer(), why :: String.t()}}
+  @spec sure(State.t()) :: :ok | {:error, {line :: pos_integer(), why :: String.t()}}
   def sure(state) do
     case Enum.sort(for {_, name, _} = remark <- state.left, name in @sensors, do: remark) do
       [] -> :ok
@@ -24,7 +26,7 @@ defmodule Player.Boards do
   end
 
   @doc "Makes boards and poses consistent, for a body of that kind."
-  @spec complete(Player.Defaults.t(), :magellan | :atrv_mini) :: Player.Defaults.t()
+  @spec complete(State.t(), :magellan | :atrv_mini) :: State.t()
   def complete(state, kind) do
     body = apply(Profile, kind, [])
     state |> banked(body) |> ringed(body)
@@ -32,8 +34,8 @@ defmodule Player.Boards do
 
   # If the file has no poses, the sonars of our profile are used.
   defp banked(state, body) do
-    banks = Player.Defaults.value(state, [:drive, :sonar_banks])
-    sonars = Player.Defaults.value(state, [:body, :sonars])
+    banks = value(state, [:drive, :sonar_banks])
+    sonars = value(state, [:body, :sonars])
     count = length(sonars || body.sonars)
 
     cond do
@@ -41,41 +43,36 @@ defmodule Player.Boards do
         {_, _, line, _option} = List.keyfind(state.values, [:body, :sonars], 0)
 
         why = "is not given: taken for boards of 8, #{count} sonars in all"
-        Player.Defaults.assume(state, line, "num_sonars_in_bank", why)
+        assume(state, line, "num_sonars_in_bank", why)
 
       banks == nil or (sonars != nil and Enum.sum(banks) == count) ->
         state
 
       Enum.sum(banks) == count ->
-        {_, _, line, option} = List.keyfind(state.values, [:drive, :sonar_banks], 0)
-
-        Player.Defaults.assume(
-          state,
-          line,
-          option,
-          "there are no poses: those of a #{body.name} are taken"
-        )
+        assume(state, [:drive, :sonar_banks], of_body(body))
 
       true ->
         why =
           "adds up to #{Enum.sum(banks)} sonars, and there are no poses; a #{body.name} has #{count}"
 
-        Player.Defaults.leave(state, &match?({[:drive, :sonar_banks], _, _, _}, &1), why)
+        leave(state, [[:drive, :sonar_banks]], why)
     end
   end
 
+  defp of_body(body), do: "there are no poses: those of a #{body.name} are taken"
+
   # Player lists poses in the order of the reports, unlike our profile.
   defp ringed(state, body) do
-    case Player.Defaults.value(state, [:body, :irs]) do
+    case value(state, [:body, :irs]) do
       nil ->
-        unplaced(state, Player.Defaults.value(state, [:drive, :ir_banks]), body)
+        unplaced(state, value(state, [:drive, :ir_banks]), body)
 
       [] ->
         state |> boardless() |> calibrated(0)
 
       irs ->
         state =
-          Player.Defaults.keep(state, 1, "poses", [
+          keep(state, 1, "poses", [
             {[:drive, :ir_order], Enum.to_list(0..(length(irs) - 1))}
           ])
 
@@ -87,26 +84,19 @@ defmodule Player.Boards do
 
   defp unplaced(state, banks, body) do
     if Enum.sum(banks) == length(body.irs) do
-      {_, _, line, option} = List.keyfind(state.values, [:drive, :ir_banks], 0)
-
-      Player.Defaults.assume(
-        state,
-        line,
-        option,
-        "there are no poses: those of a #{body.name} are taken"
-      )
+      assume(state, [:drive, :ir_banks], of_body(body))
     else
       why = "adds up to #{Enum.sum(banks)} infrareds, and there are no poses of them"
-      Player.Defaults.leave(state, &match?({[:drive, :ir_banks], _, _, _}, &1), why)
+      leave(state, [[:drive, :ir_banks]], why)
     end
   end
 
   defp boarded(state, irs) do
-    banks = Player.Defaults.value(state, [:drive, :ir_banks])
+    banks = value(state, [:drive, :ir_banks])
 
     cond do
       banks == nil ->
-        Player.Defaults.keep(state, 1, "poses", [{[:drive, :ir_banks], boards(irs)}])
+        keep(state, 1, "poses", [{[:drive, :ir_banks], boards(irs)}])
 
       Enum.sum(banks) == irs ->
         state
@@ -120,35 +110,28 @@ defmodule Player.Boards do
   defp boardless(state) do
     none? = &match?({[:drive, :ir_banks], [_ | _], _, _}, &1)
 
-    if Enum.sum(Player.Defaults.value(state, [:drive, :ir_banks]) || []) == 0,
+    if Enum.sum(value(state, [:drive, :ir_banks]) || []) == 0,
       do: %{state | values: Enum.reject(state.values, none?)},
       else: unboarded(state, 0)
   end
 
   defp unboarded(state, irs) do
-    banks? = &match?({[:drive, :ir_banks], _, _, _}, &1)
-    Player.Defaults.leave(state, banks?, "is not for #{irs} infrareds")
+    leave(state, [[:drive, :ir_banks]], "is not for #{irs} infrareds")
   end
 
   defp boards(irs) when irs <= 8, do: [irs]
   defp boards(irs), do: [8 | boards(irs - 8)]
 
   defp calibrated(state, irs) do
-    case Player.Defaults.value(state, [:drive, :conversions, :ir_a]) do
+    case value(state, [:drive, :conversions, :ir_a]) do
       as when is_list(as) and length(as) != irs ->
-        calibration? =
-          &match?({[:drive, :conversions, name], _, _, _} when name in [:ir_a, :ir_b], &1)
-
-        Player.Defaults.leave(
-          state,
-          calibration?,
-          "is for #{length(as)} infrareds, not for #{irs}"
-        )
+        laws = for name <- [:ir_a, :ir_b], do: [:drive, :conversions, name]
+        leave(state, laws, "is for #{length(as)} infrareds, not for #{irs}")
 
       nil ->
         {_, _, line, _option} = List.keyfind(state.values, [:body, :irs], 0)
         why = "is not given, so that no infrared is read"
-        Player.Defaults.assume(state, line, "rflex_ir_calib", why)
+        assume(state, line, "rflex_ir_calib", why)
 
       _one_or_as_many ->
         state

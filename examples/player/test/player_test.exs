@@ -8,13 +8,9 @@ defmodule PlayerTest do
   doctest Player.Sections
   doctest Player.Tokens
   doctest Player.Units
-  doctest Robot.File.Odd
-  doctest Robot.File.Summary
-  doctest Robot.File.Writer
+  doctest Player.Writer
 
-  alias Robot.File.Writer
-
-  alias Player.Sections
+  alias Player.{Sections, Writer}
 
   # A configuration of an ATRV mini for Player 1.6: millimetres, degrees, angles of sonars in
   # radians and first.

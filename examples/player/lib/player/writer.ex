@@ -1,4 +1,4 @@
-defmodule Robot.File.Writer do
+defmodule Player.Writer do
   @moduledoc """
   Writes values as a robot file that `Robot.File` reads. Pure.
   """
@@ -7,7 +7,7 @@ defmodule Robot.File.Writer do
   The text of a file: remarks as comments at its head, and its keys. In values, `{:deg, x}` means
   x degrees, and a driver is `{module, options}`.
 
-      iex> Robot.File.Writer.text(["mag1"], id: :mag1, start: {0.0, 0.0, {:deg, 90.0}})
+      iex> Player.Writer.text(["mag1"], id: :mag1, start: {0.0, 0.0, {:deg, 90.0}})
       "# mag1\\n[\\n  id: :mag1,\\n  start: {0.0, 0.0, deg(90)}\\n]\\n"
   """
   @spec text([String.t()], keyword()) :: String.t()
