@@ -1,4 +1,4 @@
-defmodule Console.Picture.MapSheet do
+defmodule Console.MapSheet do
   @moduledoc """
   Draws the built-in maps side by side (SVG), for the user guide. Pure.
 
