@@ -27,7 +27,7 @@ defmodule Bench.Mesh.Main do
 
   defp words(about) do
     "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
-      "figure is the largest.\n#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
+      "figure is the largest.\n#{Load.words(about)}; #{about.schedulers} processors."
   end
 
   defp table do

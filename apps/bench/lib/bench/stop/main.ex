@@ -23,7 +23,7 @@ defmodule Bench.Stop.Main do
 
   defp words(about) do
     "Times run from before the cause to when both axes were told to stand, at the line's other end. " <>
-      "#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
+      "#{Load.words(about)}; #{about.schedulers} processors."
   end
 
   defp table do

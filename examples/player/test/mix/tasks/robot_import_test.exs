@@ -116,7 +116,7 @@ defmodule Mix.Tasks.Robot.ImportTest do
           {[file, file], "one file at a time, not 2"},
           {[file, "--outt", "x"], "unknown option --outt; did you mean --out?"},
           {[file, "--player", "3"], "--player: expected 1 for 1.x or 2 for later ones, got 3"},
-          {[file, "--player", "x"], "--player: expected a whole number, got x"},
+          {[file, "--player", "x"], ~s(--player: expected a whole number, got "x")},
           {[file, "--profile", "magelan"],
            "--profile: expected magellan or atrv_mini, got magelan; did you mean magellan?"},
           {[file, "--name", "rover"],
