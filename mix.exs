@@ -54,7 +54,7 @@ defmodule Convoy.MixProject do
   end
 
   # `robot` is for real hardware; `fleet` holds robots, worlds and the view of people. Both have ssl, for
-  # distribution by TLS (rel/env.sh.eex). Neither has benchmarks or the importer of Player's files.
+  # distribution by TLS (rel/env.sh.eex). Neither has benchmarks.
   defp releases do
     robot =
       Keyword.new(

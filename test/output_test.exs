@@ -20,7 +20,6 @@ defmodule System.OutputTest do
           "robot.check --help",
           "demo --help",
           "fleet.certs --help",
-          "robot.import --help",
           "blobs --help",
           "calibrate odometry --help",
           "chaos --help",

@@ -1,5 +1,5 @@
 defmodule System.SoakTest do
-  @moduledoc "The command `bin/soak` from outside; what it judges by, the tests of `bench` show."
+  @moduledoc "The command `bin/soak` from outside; what it judges by, its own tests show."
   use ExUnit.Case, async: true
   @moduletag :realtime
   @moduletag timeout: 400_000

@@ -129,7 +129,7 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :player, :sim, :mcap, :vm],
+        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :sim, :mcap, :vm],
         &Application.spec(&1, :modules)
       )
 

@@ -110,7 +110,7 @@ defmodule Docs.Reader do
   @doc "Whether a line is a command of the shell."
   @spec command?(String.t()) :: boolean()
   def command?(line) do
-    case Regex.run(~r/^(?:\(umask 077; |[A-Z_]+=\S+ +)*([\w.\/-]+)(?=[\s;]|$)/, line) do
+    case Regex.run(~r/^(?:\((?:umask 077; )?|[A-Z_]+=\S+ +)*([\w.\/-]+)(?=[\s;]|$)/, line) do
       [_all, "bin/" <> _] -> true
       [_all, "_build/" <> _] -> String.contains?(line, " ")
       [_all, "rel/" <> _] -> not (line =~ ~r/^rel\/\S+\.\w+$/)

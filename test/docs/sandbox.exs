@@ -11,7 +11,7 @@ defmodule Docs.Sandbox do
   # Nothing here meets another fleet of this machine, nor finds a camera.
   @environment [{"CONVOY_INTERFACE", "127.0.0.1"}]
   # The Mix tasks that leave all else of their VM as it is.
-  @tasks ~w(blobs calibrate chaos demo fleet.certs fleet.secret replay robot.check robot.import scenario)
+  @tasks ~w(blobs calibrate chaos demo fleet.certs fleet.secret replay robot.check scenario)
 
   @doc "Makes the folder, with what was built in it. Where Mix builds all again, this takes as long as that."
   @spec prepare(Path.t(), String.t()) :: Path.t()

@@ -1,5 +1,6 @@
 defmodule Bench.Command do
   @moduledoc "Runs a command `mix bench NAME`: reads its options by its table, or prints its help."
+  alias Bench.Load
   alias Console.Cli.{Arguments, MapName, Output, Progress}
 
   @doc "Measures with the options given, by their names; each error is one line. `more` ends the help."
@@ -42,6 +43,22 @@ defmodule Bench.Command do
     Sim.Trial.Memory.prepare()
     {job, measure.(job)}
   end
+
+  @doc "What was measured with a progress line, and the load of the machine before and after it."
+  @spec loaded((Output.t() -> result)) :: {result, %{atom() => term()}} when result: term()
+  def loaded(measure) do
+    output = Output.to(:stderr)
+    before = Load.now()
+    result = measure.(output)
+    Output.finish(output)
+
+    {result,
+     %{load_before: before, load_after: Load.now(), schedulers: System.schedulers_online()}}
+  end
+
+  @doc "Shows what a bench does now."
+  @spec note(Output.t()) :: (String.t() -> :ok)
+  def note(output), do: &Output.progress(output, "bench: " <> &1)
 
   @doc "Shows how far a bench is."
   @spec progress(Output.t(), number(), number(), String.t()) :: :ok

@@ -10,8 +10,12 @@ defmodule Bench.Load do
          else: (_unknown -> nil)
   end
 
-  @doc "The load before a bench, and that after it, in words: now, unless it is given."
-  @spec words(before :: float() | nil, later :: float() | nil) :: String.t()
-  def words(before, later \\ now()),
+  @doc "The load before and after a bench (`Bench.Command.loaded/1`), in words."
+  @spec words(%{
+          :load_before => float() | nil,
+          :load_after => float() | nil,
+          optional(atom()) => term()
+        }) :: String.t()
+  def words(%{load_before: before, load_after: later}),
     do: "Load of the machine (1 min): #{before || "?"} before, #{later || "?"} after"
 end

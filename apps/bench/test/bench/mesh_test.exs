@@ -7,7 +7,6 @@ defmodule Bench.MeshTest do
 
   doctest Bench.Mesh
   doctest Bench.Mesh.Figures
-  doctest Bench.Mesh.Main
   doctest Bench.Mesh.Report
 
   defp row(name, size, ours, bare) do

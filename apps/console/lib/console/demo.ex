@@ -3,7 +3,7 @@ defmodule Console.Demo do
   Runs the demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
   alias Console.{Fleet, Options, Picture, Report, Tables}
-  alias Console.Cli.{Format, Output, Progress}
+  alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Hal.Pose
   alias Robot.Navigation.MapFile
@@ -209,21 +209,8 @@ defmodule Console.Demo do
     %{run | told: run.told + length(new)}
   end
 
-  defp draw(%{output: %Output{columns: nil}} = run, _scene), do: run
-
-  defp draw(run, scene) do
-    now = System.monotonic_time(:millisecond)
-
-    if now - run.drawn_ms >= @progress_ms do
-      line =
-        Progress.line(scene.at_ms / 1000, run.duration_s, note(scene), run.output.columns - 1)
-
-      Output.progress(run.output, line)
-      %{run | drawn_ms: now}
-    else
-      run
-    end
-  end
+  defp draw(run, scene),
+    do: Output.redraw(run, fn -> {scene.at_ms / 1000, run.duration_s, note(scene)} end)
 
   defp note(%{leader: nil}), do: "no leader yet"
   defp note(%{error: nil} = scene), do: "#{scene.leader} leads"

@@ -207,15 +207,13 @@ the prompt then takes pause, step, speed"},
   defp put({"robots", _count}, options), do: options
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
   defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
-  defp put({"leader-change", on?}, options), do: %{options | leader_change: on?}
-  defp put({"page-address", address}, options), do: %{options | page_address: address}
-  defp put({"page-token", token}, options), do: %{options | page_token: token}
-  defp put({"save-map", file}, options), do: %{options | save_map: file}
-  defp put({"record-pictures", rate}, options), do: %{options | record_pictures: rate}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
 
-  defp put({name, value}, options),
-    do: Map.replace!(options, String.to_existing_atom(name), value)
+  # The other names in the table are those of the struct.
+  defp put({name, value}, options) do
+    key = name |> String.replace("-", "_") |> String.to_existing_atom()
+    Map.replace!(options, key, value)
+  end
 
   defp fleet(pairs) do
     case {List.keyfind(pairs, "robots", 0), List.keyfind(pairs, "fleet", 0)} do

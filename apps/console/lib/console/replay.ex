@@ -4,12 +4,11 @@ defmodule Console.Replay do
   reading is as recorded, how the fleet stood at a time (`.Moment`), compares two recordings, and goes through one tick by
   tick (`.Session`).
   """
-  alias Console.Cli.{Format, Output, Progress}
+  alias Console.Cli.{Format, Output}
   alias Console.Replay.{Asked, Difference, Live, Moment, Options, Session}
   alias Console.Tables
   alias Sim.{Recording, Replay, Trial}
 
-  @progress_ms 100
   # So many differences are shown; the first ones explain the others.
   @shown 3
 
@@ -139,17 +138,10 @@ defmodule Console.Replay do
   defp tabulate(%{tick: {_at_ms, entries}} = run),
     do: %{run | tables: Tables.tick(run.tables, entries, Trial.scene(Replay.trial(run.replay)))}
 
-  defp draw(%{output: %Output{columns: nil}} = run), do: run
-
   defp draw(run) do
-    if Hal.Clock.now_ms() - run.drawn_ms >= @progress_ms do
-      at_s = Replay.trial(run.replay).at_ms / 1000
-      line = Progress.line(at_s, run.until_ms / 1000, "replayed", run.output.columns - 1)
-      Output.progress(run.output, line)
-      %{run | drawn_ms: Hal.Clock.now_ms()}
-    else
-      run
-    end
+    Output.redraw(run, fn ->
+      {Replay.trial(run.replay).at_ms / 1000, run.until_ms / 1000, "replayed"}
+    end)
   end
 
   defp tell(%{quiet?: true} = run), do: run

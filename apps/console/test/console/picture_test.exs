@@ -1,6 +1,6 @@
 defmodule Console.PictureTest do
   use ExUnit.Case, async: true
-  alias Console.{Picture, Runs}
+  alias Console.{MapSheet, Picture, Runs}
 
   doctest Console.Picture.MapView
   doctest Console.Picture.Floorplan
@@ -11,11 +11,11 @@ defmodule Console.PictureTest do
   @sheet Path.expand("../../../../docs/images/maps.svg", __DIR__)
 
   test "the sheet of maps in the user guide shows the maps as they are" do
-    drawn = IO.iodata_to_binary(Picture.MapSheet.draw())
+    drawn = IO.iodata_to_binary(MapSheet.draw())
 
     assert File.read!(@sheet) == drawn,
-           "write it anew: mix run --no-start -e " <>
-             ~s|'File.write!("docs/images/maps.svg", Console.Picture.MapSheet.draw())'|
+           "write it anew: MIX_ENV=test mix run --no-start -e " <>
+             ~s|'File.write!("docs/images/maps.svg", Console.MapSheet.draw())'|
 
     document = parse(drawn)
     for name <- Sim.Floorplan.Maps.names(), do: assert(drawn =~ ">#{name}, ")

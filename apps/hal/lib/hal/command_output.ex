@@ -47,17 +47,38 @@ defmodule Hal.CommandOutput do
         ) :: term()
   def run(name, words, help, parser, carry_out) do
     run(name, fn ->
-      case OptionParser.parse(words, parser) do
-        {_options, _words, [{option, nil} | _]} ->
-          refuse(unknown(option, parser[:strict]))
-
-        {_options, _words, [{option, text} | _]} ->
-          refuse("#{option}: expected #{value(option, parser[:strict])}, got #{text}")
-
-        {options, words, []} ->
-          if options[:help], do: help(help), else: told(carry_out.(options, words))
+      case parse(words, parser) do
+        {:ok, options, words} -> told(carry_out.(options, words))
+        {:error, line} -> refuse(line)
+        :help -> help(help)
       end
     end)
+  end
+
+  @doc """
+  The options and the other words of a command by those of `OptionParser`, of which one is `help`; the error is one line.
+
+      iex> parser = [strict: [every: :integer, help: :boolean]]
+      iex> Hal.CommandOutput.parse(~w(a --every 2 b), parser)
+      {:ok, [every: 2], ~w(a b)}
+      iex> Hal.CommandOutput.parse(~w(--every x), parser)
+      {:error, ~s(--every: expected a whole number, got "x")}
+      iex> Hal.CommandOutput.parse(~w(--evry 2), parser)
+      {:error, "unknown option --evry; did you mean --every?"}
+  """
+  @spec parse([String.t()], keyword()) ::
+          {:ok, keyword(), [String.t()]} | :help | {:error, String.t()}
+  def parse(words, parser) do
+    case OptionParser.parse(words, parser) do
+      {_options, _words, [{option, nil} | _]} ->
+        {:error, unknown(option, parser[:strict])}
+
+      {_options, _words, [{option, text} | _]} ->
+        {:error, "#{option}: expected #{value(option, parser[:strict])}, got #{inspect(text)}"}
+
+      {options, words, []} ->
+        if options[:help], do: :help, else: {:ok, options, words}
+    end
   end
 
   defp help(text), do: Mix.shell().info(text)
@@ -78,8 +99,11 @@ defmodule Hal.CommandOutput do
 
     if option in names,
       do: "#{option} needs a value",
-      else: "unknown option #{option}#{Suggest.hint(option, names)}"
+      else: "unknown option #{option}#{hint(option, names)}"
   end
+
+  defp hint(option, names),
+    do: with("" <- Suggest.hint(option, names), do: "; known are #{Enum.join(names, ", ")}")
 
   @doc "Prints errors of a Mix task, and ends it with status 1."
   @spec refuse(String.t() | [String.t()]) :: no_return()

@@ -53,7 +53,7 @@ defmodule Sim.Fleet do
     end
   end
 
-  # Events such as a freeze are done to real processes by other means (`Bench.Soak`).
+  # Events such as a freeze are done to real processes by other means (`bin/soak`).
   defp unscripted(%{script: []}), do: :ok
 
   defp unscripted(_options),

@@ -76,7 +76,7 @@ defmodule Bench.Mesh.Bare do
   def pings(names, count) do
     pids = pids(names)
 
-    repeat(count, fn ->
+    Watch.repeat(count, fn ->
       ref = make_ref()
       :lists.foreach(&send(&1, {:ping, self(), ref}), pids)
       :lists.foreach(fn _ -> receive do: ({^ref, :pong} -> :ok) end, pids)
@@ -88,7 +88,7 @@ defmodule Bench.Mesh.Bare do
   def rounds(names, count) do
     pids = pids(names)
 
-    repeat(count, fn ->
+    Watch.repeat(count, fn ->
       ref = make_ref()
       :lists.foreach(&send(&1, {:round, pids, self(), ref}), pids)
       :lists.foreach(fn _ -> receive do: ({^ref, :done} -> :ok) end, pids)
@@ -136,12 +136,4 @@ defmodule Bench.Mesh.Bare do
   end
 
   defp pids(names), do: :lists.append(:lists.map(&:pg.get_members(@scope, {:robot, &1}), names))
-
-  defp repeat(count, fun), do: for(_ <- :lists.seq(1, count), do: timed(fun))
-
-  defp timed(fun) do
-    began = :erlang.monotonic_time(:nanosecond)
-    fun.()
-    (:erlang.monotonic_time(:nanosecond) - began) / 1_000
-  end
 end

@@ -60,7 +60,7 @@ defmodule Bench.Mesh.Convoy do
   @spec pings([atom()], pos_integer()) :: [float()]
   def pings(robots, count) do
     all = length(robots)
-    repeat(count, fn -> ^all = map_size(Commands.Client.ask(robots, :ping)) end)
+    Watch.repeat(count, fn -> ^all = map_size(Commands.Client.ask(robots, :ping)) end)
   end
 
   @doc "Envelopes: asks all agents and gathers their answers; microseconds each."
@@ -74,7 +74,7 @@ defmodule Bench.Mesh.Convoy do
   defp asks(robots, content, count) do
     peers = for id <- robots, do: {id, Bench.Mesh.Agent.service()}
 
-    repeat(count, fn ->
+    Watch.repeat(count, fn ->
       question = Envelope.new(:query, :base, content)
       {:complete, _answers, []} = Conversation.gather(peers, question, @patience_ms)
     end)
@@ -174,12 +174,4 @@ defmodule Bench.Mesh.Convoy do
     do: :counters.add(counters, index, 1)
 
   def trace(_counters, _index, _entry), do: :ok
-
-  defp repeat(count, fun), do: for(_ <- 1..count, do: timed(fun))
-
-  defp timed(fun) do
-    began = System.monotonic_time(:nanosecond)
-    fun.()
-    (System.monotonic_time(:nanosecond) - began) / 1_000
-  end
 end

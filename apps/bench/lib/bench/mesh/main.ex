@@ -9,16 +9,17 @@ defmodule Bench.Mesh.Main do
     do: Command.run(arguments, "swarm", table(), &measure/1, Command.cases(Mesh.cases()))
 
   defp measure(given) do
-    output = Output.to(:stderr)
     many = Map.get(given, "robots-in-one-node", 100)
     sizes = Map.get(given, "nodes", [3, 10, 30]) ++ if(many > 0, do: [:one], else: [])
-    note = &Output.progress(output, "bench: " <> &1)
     cases = Map.get(given, "only", Mesh.cases())
-    plan = %{cases: cases, share: Map.get(given, "share", 100) / 100, note: note}
-    before = Load.now()
-    rows = Enum.flat_map(sizes, &Mesh.Runner.rows(&1, if(&1 == :one, do: many, else: &1), plan))
-    Output.finish(output)
-    about = %{load_before: before, load_after: Load.now(), schedulers: System.schedulers_online()}
+    share = Map.get(given, "share", 100) / 100
+
+    {rows, about} =
+      Command.loaded(fn output ->
+        plan = %{cases: cases, share: share, note: Command.note(output)}
+        Enum.flat_map(sizes, &Mesh.Runner.rows(&1, if(&1 == :one, do: many, else: &1), plan))
+      end)
+
     IO.write(Mesh.Report.draw(rows))
     IO.puts("\n" <> words(about))
     Output.json(given["json"], Mesh.Report.term(rows, about))
@@ -26,34 +27,17 @@ defmodule Bench.Mesh.Main do
 
   defp words(about) do
     "Bare OTP: the same nodes with :pg and send alone, right before ours. Of fewer than 100 times the second " <>
-      "figure is the largest.\n#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
+      "figure is the largest.\n#{Load.words(about)}; #{about.schedulers} processors."
   end
 
   defp table do
     [
-      {"nodes", "N,N", &sizes/1, "how many nodes (3,10,30)"},
+      {"nodes", "N,N", &Parse.wholes(&1, 2..100), "how many nodes (3,10,30)"},
       {"robots-in-one-node", "N", &Parse.whole(&1, 0..200),
        "and this many robots in one node; 0 for none (100)"},
       {"only", "NAME,NAME", &Mesh.choose/1, "which cases (all)"},
       {"share", "PERCENT", &Parse.whole(&1, 1..1_000), "how much of the usual repetitions (100)"},
       {"json", "FILE", &{:ok, &1}, "write the figures there too"}
     ]
-  end
-
-  @doc """
-  Numbers of nodes.
-
-      iex> Bench.Mesh.Main.sizes("3,10")
-      {:ok, [3, 10]}
-      iex> Bench.Mesh.Main.sizes("1")
-      {:error, "whole numbers from 2 to 100, with commas between"}
-  """
-  @spec sizes(String.t()) :: {:ok, [pos_integer()]} | {:error, String.t()}
-  def sizes(text) do
-    numbers = text |> String.split(",") |> Enum.map(&Parse.whole(&1, 2..100))
-
-    if Enum.all?(numbers, &match?({:ok, _}, &1)),
-      do: {:ok, for({:ok, number} <- numbers, do: number)},
-      else: {:error, "whole numbers from 2 to 100, with commas between"}
   end
 end

@@ -93,24 +93,13 @@ defmodule Bench.Mesh.Nodes do
     at_ns
   end
 
-  @doc "Its memory in bytes: the resident set, and its proportional share of it."
-  @spec memory(t()) :: %{rss: pos_integer() | nil, pss: pos_integer() | nil}
+  @doc "Its memory, the resident set, in bytes."
+  @spec memory(t()) :: pos_integer() | nil
   def memory(node) do
-    %{
-      rss: kilobytes("/proc/#{node.vm.pid}/status", "VmRSS:"),
-      pss: kilobytes("/proc/#{node.vm.pid}/smaps_rollup", "Pss:")
-    }
-  end
-
-  defp kilobytes(file, key) do
-    with {:ok, text} <- File.read(file),
-         line when is_binary(line) <-
-           text |> String.split("\n") |> Enum.find(&String.starts_with?(&1, key)),
-         {number, _kb} <- line |> String.replace(key, "") |> String.trim() |> Integer.parse() do
-      number * 1024
-    else
-      _unknown -> nil
-    end
+    with {:ok, text} <- File.read("/proc/#{node.vm.pid}/status"),
+         [_line, kilobytes] <- Regex.run(~r/VmRSS:\s+(\d+)/, text),
+         do: 1024 * String.to_integer(kilobytes),
+         else: (_unknown -> nil)
   end
 
   @doc "Ends nodes, even frozen ones."

@@ -63,7 +63,7 @@ defmodule Bench.Mesh.Runner do
       try do
         meet(s, [base], nodes)
         Nodes.call(base, s.code, :full, [count + 1, names], 60_000)
-        memory = for node <- nodes, do: Nodes.memory(node).rss
+        memory = for node <- nodes, do: Nodes.memory(node)
         fixed = %{start: [[(full_ns - began_ns) / 1_000]], memory: [memory]}
 
         fixed =

@@ -54,6 +54,17 @@ defmodule Bench.Mesh.Watch do
   @spec now_ns() :: integer()
   def now_ns, do: :os.system_time(:nanosecond)
 
+  # In Erlang's style, as in `Bench.Mesh.Bare`.
+  @doc "Does something so many times; microseconds of each."
+  @spec repeat(pos_integer(), (... -> term())) :: [float()]
+  def repeat(count, fun), do: for(_ <- :lists.seq(1, count), do: timed(fun))
+
+  defp timed(fun) do
+    began = :erlang.monotonic_time(:nanosecond)
+    fun.()
+    (:erlang.monotonic_time(:nanosecond) - began) / 1_000
+  end
+
   defp loop(see, seen, asked) do
     receive do
       {:when, what, pid, ref} ->

@@ -1,7 +1,7 @@
 defmodule Bench.Page.Main do
   @moduledoc "Runs the command `mix bench page`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Page}
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Parse
 
   @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5}
 
@@ -10,20 +10,17 @@ defmodule Bench.Page.Main do
   def run(arguments), do: Command.run(arguments, "page", table(), &measure/1)
 
   defp measure(given) do
-    output = Output.to(:stderr)
-    note = &Output.progress(output, "bench: " <> &1)
     given = Map.new(@defaults, fn {key, most} -> {key, Map.get(given, "#{key}", most)} end)
     Logger.configure(level: :none)
-    before = Load.now()
+    {measured, about} = Command.loaded(&Page.measure(given, Command.note(&1)))
 
-    with {:ok, turns} <- Page.measure(given, note) do
-      Output.finish(output)
+    with {:ok, turns} <- measured do
       IO.puts(Page.draw(turns))
 
       IO.puts(
         "\n#{given.robots} robots; #{given.clients} readers, #{given.slow} deaf; #{given.rounds} turns of " <>
           "#{given.seconds} s each, medians. Processor time without the robots' own. " <>
-          "#{Load.words(before)}; #{System.schedulers_online()} processors."
+          "#{Load.words(about)}; #{about.schedulers} processors."
       )
     else
       {:error, line} -> {:error, [line]}

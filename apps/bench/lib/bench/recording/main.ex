@@ -1,7 +1,7 @@
 defmodule Bench.Recording.Main do
   @moduledoc "Runs the command `mix bench recording`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Recording, Table}
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Parse
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -10,27 +10,25 @@ defmodule Bench.Recording.Main do
   defp measure(given), do: Command.in_folder("recording", &measure(given, &1))
 
   defp measure(given, folder) do
-    output = Output.to(:stderr)
     rounds = Map.get(given, "rounds", 7)
 
     jobs =
       for robots <- given["robots"] || [6, 12], seed <- given["seeds"] || 1..5, do: {robots, seed}
 
-    before = Load.now()
+    {results, about} =
+      Command.loaded(fn output ->
+        for {{robots, seed}, n} <- Enum.with_index(jobs) do
+          Command.progress(output, n, length(jobs), "#{robots} robots, seed #{seed}")
+          Recording.measure(robots, seed, rounds, folder)
+        end
+      end)
 
-    results =
-      for {{robots, seed}, n} <- Enum.with_index(jobs) do
-        Command.progress(output, n, length(jobs), "#{robots} robots, seed #{seed}")
-        Recording.measure(robots, seed, rounds, folder)
-      end
-
-    Output.finish(output)
     measured = for {:ok, measured} <- results, do: measured
     IO.write(draw(measured))
 
     IO.puts(
       "#{rounds} runs of each seed, by turns without and with recording; medians; of what recording " <>
-        "adds, the quartiles and the median of all pairs. Processor time is the VM's.\n#{Load.words(before)}."
+        "adds, the quartiles and the median of all pairs. Processor time is the VM's.\n#{Load.words(about)}."
     )
 
     Command.failed(for({:error, line} <- results, do: line))

@@ -1,26 +1,24 @@
 defmodule Bench.Scale.Main do
   @moduledoc "Runs the command `mix bench scale`: reads its options, measures, prints table and bars."
   alias Bench.{Command, Load, Scale}
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Parse
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
   def run(arguments), do: Command.run(arguments, "scale", table(), &measure/1)
 
   defp measure(given) do
-    output = Output.to(:stderr)
     fleets = given |> Map.get("robots", [6, 20, 50]) |> Enum.sort()
     blobs = Map.get(given, "blobs", :painted)
     seconds = Map.get(given, "seconds", 20)
-    before = Load.now()
 
-    results =
-      for {robots, n} <- Enum.with_index(fleets) do
-        Command.progress(output, n, length(fleets), "#{robots} robots")
-        Scale.measure(robots, blobs, seconds)
-      end
-
-    Output.finish(output)
+    {results, about} =
+      Command.loaded(fn output ->
+        for {robots, n} <- Enum.with_index(fleets) do
+          Command.progress(output, n, length(fleets), "#{robots} robots")
+          Scale.measure(robots, blobs, seconds)
+        end
+      end)
 
     with [] <- for({:error, line} <- results, do: line) do
       measured = for {:ok, measured} <- results, do: measured
@@ -28,7 +26,7 @@ defmodule Bench.Scale.Main do
       IO.write(Scale.draw(measured))
 
       IO.puts(
-        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. #{Load.words(before)}."
+        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. #{Load.words(about)}."
       )
     else
       lines -> {:error, lines}

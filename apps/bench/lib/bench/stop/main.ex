@@ -11,13 +11,11 @@ defmodule Bench.Stop.Main do
   defp measure(given), do: Command.in_folder("stop", &measure(given, &1))
 
   defp measure(given, folder) do
-    output = Output.to(:stderr)
     cases = Map.get(given, "only", Stop.cases())
-    note = &Output.progress(output, "bench: " <> &1)
-    before = Load.now()
-    results = Stop.Runner.run(cases, Map.get(given, "times", 20), folder, note)
-    Output.finish(output)
-    about = %{load_before: before, load_after: Load.now(), schedulers: System.schedulers_online()}
+    times = Map.get(given, "times", 20)
+
+    {results, about} = Command.loaded(&Stop.Runner.run(cases, times, folder, Command.note(&1)))
+
     IO.write(Stop.Report.draw(results))
     IO.puts("\n" <> words(about))
     Output.json(given["json"], Stop.Report.term(results, about))
@@ -25,7 +23,7 @@ defmodule Bench.Stop.Main do
 
   defp words(about) do
     "Times run from before the cause to when both axes were told to stand, at the line's other end. " <>
-      "#{Load.words(about.load_before, about.load_after)}; #{about.schedulers} processors."
+      "#{Load.words(about)}; #{about.schedulers} processors."
   end
 
   defp table do

@@ -10,21 +10,21 @@ defmodule Bench.Vision.Main do
   defp measure(given), do: Command.in_folder("vision", &measure(given, &1))
 
   defp measure(given, folder) do
-    output = Output.to(:stderr)
     rounds = Map.get(given, "rounds", 40)
     kinds = Map.get(given, "frames", Keyword.keys(Vision.kinds()))
     plan = Map.merge(plan(given["beside"]), %{rounds: rounds, folder: folder})
     photo = Map.get_lazy(given, "photo", &photo/0)
-    before = Load.now()
 
-    measured =
-      for {kind, n} <- Enum.with_index(kinds) do
-        note = &progress(output, kind, n * rounds + &1, length(kinds) * rounds)
-        {kind, one(kind, photo, plan, note)}
-      end
+    {measured, about} =
+      Command.loaded(fn output ->
+        for {kind, n} <- Enum.with_index(kinds) do
+          named = "frames: #{Vision.kinds()[kind]}"
+          all = length(kinds) * rounds
+          {kind, one(kind, photo, plan, &Command.progress(output, n * rounds + &1, all, named))}
+        end
+      end)
 
-    Output.finish(output)
-    about = %{load_before: before, load_after: Load.now(), rounds: rounds}
+    about = Map.put(about, :rounds, rounds)
     IO.write(Vision.Report.draw(plan.ways, measured))
     IO.puts("\n" <> words(about))
     json = Output.json(given["json"], Vision.Report.term(plan.ways, measured, about))
@@ -48,11 +48,6 @@ defmodule Bench.Vision.Main do
     frames ++ for {kind, %{beside: {:absent, why}}} <- measured, do: "--beside, #{kind}: #{why}"
   end
 
-  defp progress(output, kind, done, all) do
-    note = "frames: #{Vision.kinds()[kind]}"
-    Command.progress(output, done, all, note)
-  end
-
   defp plan(nil), do: %{ways: Vision.ways(), programs: %{opencv: Vision.Beside.opencv()}}
 
   defp plan(program) do
@@ -67,7 +62,7 @@ defmodule Bench.Vision.Main do
     {width, height, copies} = Vision.Frames.size()
 
     "#{width}x#{height} yuyv, eight classes, #{copies} rolled copies in turn; the median of #{about.rounds} rounds, in each " <>
-      "of which each way searches all copies. Ratios to the kernel in the same round.\n#{Load.words(about.load_before, about.load_after)}."
+      "of which each way searches all copies. Ratios to the kernel in the same round.\n#{Load.words(about)}."
   end
 
   defp table do

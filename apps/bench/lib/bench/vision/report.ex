@@ -15,8 +15,7 @@ defmodule Bench.Vision.Report do
   def draw(ways, measured) do
     heads = ["us a frame (times the kernel; page faults)" | Enum.map(measured, &head/1)]
     rows = for way <- ways, do: [way.says | Enum.map(measured, &cell(way.name, &1))]
-    lines = [heads, Enum.map(heads, fn _ -> "---" end)] ++ rows
-    table = Enum.map_join(lines, "\n", &("| " <> Enum.join(&1, " | ") <> " |"))
+    table = String.trim_trailing(Table.markdown(heads, rows))
     Enum.join([table | Enum.flat_map(measured, &notes(&1, ways))], "\n\n") <> "\n"
   end
 

@@ -61,20 +61,6 @@ defmodule Mix.Tasks.Bench do
     with {:error, lines} <- @commands[name].run(arguments), do: refuse(lines)
   end
 
-  defp bench(["soak" | arguments]) do
-    CommandBuild.update()
-
-    case Bench.Soak.Main.arguments(arguments) do
-      {:ok, what} ->
-        status = Bench.Soak.Main.run(what, Path.join(Mix.Project.build_path(), "soak"))
-        if status > 0, do: exit({:shutdown, status})
-
-      {:error, line} ->
-        IO.puts(:stderr, "soak: #{line}; bin/soak --help explains it")
-        exit({:shutdown, 2})
-    end
-  end
-
   defp bench(arguments) when arguments in [["--help"], ["-h"]], do: help()
 
   defp bench(_other),

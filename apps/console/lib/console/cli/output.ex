@@ -3,8 +3,10 @@ defmodule Console.Cli.Output do
   Prints the output of a command: plain lines, and on a terminal a progress line that is redrawn
   below them.
   """
-  alias Console.Cli.OutFile
+  alias Console.Cli.{OutFile, Progress}
 
+  # How often the progress line is redrawn.
+  @period_ms 100
   @clear "\r\e[K"
 
   @enforce_keys [:device, :columns]
@@ -34,6 +36,26 @@ defmodule Console.Cli.Output do
   @spec progress(t(), String.t()) :: :ok
   def progress(%__MODULE__{columns: nil}, _text), do: :ok
   def progress(%__MODULE__{} = output, text), do: IO.write(output.device, @clear <> text)
+
+  @doc """
+  Redraws the progress line of whoever keeps an `output` and when it was last `drawn_ms`, ten times a second at most;
+  `shown` says what is done of all, and a note.
+  """
+  @spec redraw(view, (... -> {number(), number(), String.t()})) :: view
+        when view: %{:output => t(), :drawn_ms => integer(), optional(atom()) => term()}
+  def redraw(%{output: %__MODULE__{columns: nil}} = view, _shown), do: view
+
+  def redraw(%{output: output} = view, shown) do
+    now_ms = Hal.Clock.now_ms()
+
+    if now_ms - view.drawn_ms >= @period_ms do
+      {done, all, note} = shown.()
+      progress(output, Progress.line(done, all, note, output.columns - 1))
+      %{view | drawn_ms: now_ms}
+    else
+      view
+    end
+  end
 
   @doc "Removes the progress line."
   @spec finish(t()) :: :ok

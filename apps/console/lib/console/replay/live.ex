@@ -4,11 +4,10 @@ defmodule Console.Replay.Live do
   the same again, how they were at a time, and why.
   """
   alias Robot.Recording
-  alias Console.Cli.{Output, Progress}
+  alias Console.Cli.Output
   alias Console.Replay.{Asked, LiveText, Options}
   alias Robot.Replay
 
-  @progress_ms 100
   # So many differences are shown; the first ones explain the others.
   @shown 3
 
@@ -95,16 +94,9 @@ defmodule Console.Replay.Live do
   defp note(run, difference),
     do: %{run | found: Enum.take(run.found ++ [difference], @shown), count: run.count + 1}
 
-  defp draw(%{output: %Output{columns: nil}} = run), do: run
-
   defp draw(run) do
-    if Hal.Clock.now_ms() - run.drawn_ms >= @progress_ms do
-      whole_s = (run.file.end_ms - run.file.start_ms) / 1000
-      line = Progress.line(run.last_ms / 1000, whole_s, "replayed", run.output.columns - 1)
-      Output.progress(run.output, line)
-      %{run | drawn_ms: Hal.Clock.now_ms()}
-    else
-      run
-    end
+    Output.redraw(run, fn ->
+      {run.last_ms / 1000, (run.file.end_ms - run.file.start_ms) / 1000, "replayed"}
+    end)
   end
 end

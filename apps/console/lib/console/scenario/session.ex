@@ -3,12 +3,10 @@ defmodule Console.Scenario.Session do
   Runs the files of `mix scenario`: one with its stages as they happen, several side by side, each
   printed as a whole in the order of the arguments.
   """
-  alias Console.Cli.{Format, Output, Progress}
+  alias Console.Cli.{Format, Output}
   alias Console.Scenario.{Options, Recording, Report}
   alias Sim.{Scenario, Trial}
   alias Sim.Scenario.Runner
-
-  @progress_ms 100
 
   @doc """
   Reads all files before the first run. The status is 0 if all expectations hold, else 2; an error
@@ -125,21 +123,12 @@ defmodule Console.Scenario.Session do
     %{view | told: view.told + length(new)}
   end
 
-  defp draw(%{output: %Output{columns: nil}} = view, _run), do: view
-
   defp draw(view, run) do
-    now_ms = System.monotonic_time(:millisecond)
-
-    if now_ms - view.drawn_ms >= @progress_ms do
+    Output.redraw(view, fn ->
       open = Enum.count(run.checks, &(&1.status in [:open, :holding]))
-      all_s = Scenario.duration_s(run.scenario)
       note = "#{open} of #{length(run.checks)} expectations undecided"
-      line = Progress.line(at_s(run), all_s, note, view.output.columns - 1)
-      Output.progress(view.output, line)
-      %{view | drawn_ms: now_ms}
-    else
-      view
-    end
+      {at_s(run), Scenario.duration_s(run.scenario), note}
+    end)
   end
 
   defp progress(%Output{columns: nil}, _done, _count), do: :ok

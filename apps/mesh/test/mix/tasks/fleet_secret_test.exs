@@ -16,7 +16,9 @@ defmodule Mix.Tasks.Fleet.SecretTest do
   end
 
   test "wrong words are one line" do
-    assert refusal(SecretTask, ["--colour"]) == "unknown option --colour"
+    assert refusal(SecretTask, ["--colour"]) ==
+             "unknown option --colour; known are --force, --help"
+
     assert refusal(SecretTask, ["one", "two"]) == "one file, not 2: one two"
     SecretTask.run(["--help"])
     assert_received {:mix_shell, :info, ["Creates the secret of a fleet" <> _rest]}

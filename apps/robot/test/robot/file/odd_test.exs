@@ -2,6 +2,8 @@ defmodule Robot.File.OddTest do
   use ExUnit.Case, async: true
   alias Robot.File.Odd
 
+  doctest Odd
+
   defp warnings(serial) do
     robot = %Robot.File{
       id: :mag1,

@@ -32,20 +32,13 @@ defmodule Sim.World.Server do
 
   @enforce_keys [:name, :world, :ticker]
   defstruct @enforce_keys ++
-              [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new(), stats: nil]
+              [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new()]
 
   @type kind :: :drive | :ptz | :camera
   @type change ::
           {:kill, robot :: atom()}
           | {:displace, robot :: atom(), Pose.t()}
           | {:move, Pose.point() | nil}
-  @type stats :: %{
-          steps: non_neg_integer(),
-          late_ms_max: non_neg_integer(),
-          late_ms_sum: non_neg_integer(),
-          busy_us: non_neg_integer(),
-          busy_us_max: non_neg_integer()
-        }
 
   @doc "Starts a world's server. Options: `name` (any term), `world` (`Sim.World`)."
   @spec start_link(keyword()) :: GenServer.on_start()
@@ -99,10 +92,6 @@ defmodule Sim.World.Server do
   @spec world(GenServer.server()) :: World.t()
   def world(server), do: GenServer.call(server, :world)
 
-  @doc "How punctual and how busy the server was since the last call of this function."
-  @spec stats(GenServer.server()) :: stats()
-  def stats(server), do: GenServer.call(server, :stats)
-
   @doc """
   Applies an intervention to a world, without waiting for its server, which may be on another
   node.
@@ -128,12 +117,11 @@ defmodule Sim.World.Server do
     ticker = Ticker.start(:step, @step_ms, @step_ms)
     # Nobody is at the wheels yet, whatever a world that goes on was told last.
     world = Enum.reduce(world.order, world, &stand(&2, &1))
-    {:ok, %__MODULE__{name: name, world: world, ticker: ticker, stats: new_stats()}}
+    {:ok, %__MODULE__{name: name, world: world, ticker: ticker}}
   end
 
   @impl GenServer
   def handle_call(:world, _from, s), do: {:reply, s.world, s}
-  def handle_call(:stats, _from, s), do: {:reply, s.stats, %{s | stats: new_stats()}}
 
   @impl GenServer
   def handle_cast({:attach, robot, kind, pid}, s) do
@@ -257,26 +245,11 @@ defmodule Sim.World.Server do
   end
 
   defp note(s, begun) do
-    late_ms = max(div(begun, 1_000) - s.ticker.due_ms, 0)
-    busy_us = System.monotonic_time(:microsecond) - begun
+    late_ms = div(begun, 1_000) - s.ticker.due_ms
     about = %{world: s.name}
     if late_ms > @late_ms, do: Event.execute([:sim, :server, :late], %{late_ms: late_ms}, about)
-
-    stats = s.stats
-
-    %{
-      s
-      | stats: %{
-          steps: stats.steps + 1,
-          late_ms_max: max(stats.late_ms_max, late_ms),
-          late_ms_sum: stats.late_ms_sum + late_ms,
-          busy_us: stats.busy_us + busy_us,
-          busy_us_max: max(stats.busy_us_max, busy_us)
-        }
-    }
+    s
   end
-
-  defp new_stats, do: %{steps: 0, late_ms_max: 0, late_ms_sum: 0, busy_us: 0, busy_us_max: 0}
 
   defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
 end

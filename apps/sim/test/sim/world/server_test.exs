@@ -166,7 +166,5 @@ defmodule Sim.World.ServerTest do
     eventually(fn -> World.Server.world(server).at_ms >= elem(before, 0) + 1_500 end)
     took = System.monotonic_time(:millisecond) - elem(before, 1)
     assert took >= 1_400
-    assert %{steps: steps, late_ms_max: _} = World.Server.stats(server)
-    assert steps >= 30
   end
 end

@@ -4,7 +4,7 @@ defmodule Vision.Blobs.Options do
   """
 
   alias Hal.Camera.Source
-  alias Hal.Options.Suggest
+  alias Hal.CommandOutput
 
   @type t :: %{
           source: String.t(),
@@ -48,13 +48,9 @@ defmodule Vision.Blobs.Options do
   """
   @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, String.t()}
   def parse(words) do
-    {given, sources, invalid} = OptionParser.parse(words, strict: @switches, aliases: [h: :help])
-
-    cond do
-      given[:help] -> :help
-      invalid != [] -> {:error, invalid |> hd() |> complain()}
-      true -> check(given, sources)
-    end
+    with {:ok, given, sources} <-
+           CommandOutput.parse(words, strict: @switches, aliases: [h: :help]),
+         do: check(given, sources)
   end
 
   defp check(given, sources) do
@@ -84,24 +80,6 @@ defmodule Vision.Blobs.Options do
        }}
     end
   end
-
-  defp complain({option, value}) do
-    known = Enum.map(Keyword.keys(@switches), &("--" <> String.replace("#{&1}", "_", "-")))
-
-    cond do
-      option in known and value == nil ->
-        "#{option} needs a value"
-
-      option in known ->
-        "#{option}: expected a whole number, got #{inspect(value)}"
-
-      true ->
-        "unknown option #{option}#{suggestion(option, known)}"
-    end
-  end
-
-  defp suggestion(option, known),
-    do: with("" <- Suggest.hint(option, known), do: "; known are #{Enum.join(known, ", ")}")
 
   defp one_source([""]), do: one_source([])
   defp one_source([source]), do: {:ok, source}

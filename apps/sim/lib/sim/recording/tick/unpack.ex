@@ -32,7 +32,7 @@ defmodule Sim.Recording.Tick.Unpack do
     pose = %Pose{x: x, y: y, heading: heading}
     odometry = %Odometry{pose: pose, twist: %Twist{linear: linear, turn: turn}}
 
-    with {:ok, effects} <- read_effects(effects, messages, []) do
+    with {:ok, effects} <- all(effects, &effect(&1, messages)) do
       entries(rest, messages, [
         {:step, id, {:reading, {:ptz, %{field_of_view: width, pan: pan, tilt: tilt}}, at_ms}, []},
         {:step, id, {:reading, {:power, volts}, at_ms}, []},
@@ -52,7 +52,7 @@ defmodule Sim.Recording.Tick.Unpack do
     effects = elem(packed, tuple_size(packed) - 1)
 
     with {:ok, input} <- read(packed),
-         {:ok, effects} <- read_effects(effects, messages, []) do
+         {:ok, effects} <- all(effects, &effect(&1, messages)) do
       entries(rest, messages, [{:step, elem(packed, 1), input, effects} | done])
     end
   end
@@ -71,7 +71,7 @@ defmodule Sim.Recording.Tick.Unpack do
 
   defp read({@detections, _id, at_ms, pan, tilt, width, pose, blobs, _effects})
        when is_list(blobs) do
-    with {:ok, blobs} <- blobs(blobs, []) do
+    with {:ok, blobs} <- all(blobs, &blob/1) do
       {:ok,
        {:detections,
         %Detections{
@@ -90,26 +90,18 @@ defmodule Sim.Recording.Tick.Unpack do
   defp read({@other, _id, input, _effects}), do: {:ok, input}
   defp read(_other), do: :error
 
-  defp read_effects([first | rest], messages, done) do
-    with {:ok, effect} <- read_effect(first, messages),
-         do: read_effects(rest, messages, [effect | done])
-  end
+  defp effect({@other, effect}, _messages), do: {:ok, effect}
 
-  defp read_effects([], _messages, done), do: {:ok, Enum.reverse(done)}
-  defp read_effects(_other, _messages, _done), do: :error
-
-  defp read_effect({@other, effect}, _messages), do: {:ok, effect}
-
-  defp read_effect({linear, turn}, _messages) when is_float(linear),
+  defp effect({linear, turn}, _messages) when is_float(linear),
     do: {:ok, {:drive, %Twist{linear: linear, turn: turn}}}
 
-  defp read_effect({@look, pan, tilt}, _messages), do: {:ok, {:look, pan, tilt}}
+  defp effect({@look, pan, tilt}, _messages), do: {:ok, {:look, pan, tilt}}
 
-  defp read_effect({@send, to, number}, messages) do
+  defp effect({@send, to, number}, messages) do
     with {:ok, message} <- at(messages, number), do: {:ok, {:send, to, message}}
   end
 
-  defp read_effect(_other, _messages), do: :error
+  defp effect(_other, _messages), do: :error
 
   defp at(messages, number)
        when is_integer(number) and number in 0..(tuple_size(messages) - 1)//1,
@@ -117,33 +109,34 @@ defmodule Sim.Recording.Tick.Unpack do
 
   defp at(_messages, _number), do: :error
 
-  defp blobs(
-         [
-           {colour, area, share, x, y, left, top, right, bottom, width, height, distance,
-            clipped?}
-           | rest
-         ],
-         done
+  defp blob(
+         {colour, area, share, x, y, left, top, right, bottom, width, height, distance, clipped?}
        ) do
-    blob = %Blob{
-      colour: colour,
-      area: area,
-      share: share,
-      x: x,
-      y: y,
-      left: left,
-      top: top,
-      right: right,
-      bottom: bottom,
-      width: width,
-      height: height,
-      distance: distance,
-      clipped?: clipped?
-    }
-
-    blobs(rest, [blob | done])
+    {:ok,
+     %Blob{
+       colour: colour,
+       area: area,
+       share: share,
+       x: x,
+       y: y,
+       left: left,
+       top: top,
+       right: right,
+       bottom: bottom,
+       width: width,
+       height: height,
+       distance: distance,
+       clipped?: clipped?
+     }}
   end
 
-  defp blobs([], done), do: {:ok, Enum.reverse(done)}
-  defp blobs(_other, _done), do: :error
+  defp blob(_other), do: :error
+
+  # All of a list, as `read` reads them; what is no list is an error.
+  defp all([first | rest], read) do
+    with {:ok, first} <- read.(first), {:ok, rest} <- all(rest, read), do: {:ok, [first | rest]}
+  end
+
+  defp all([], _read), do: {:ok, []}
+  defp all(_other, _read), do: :error
 end

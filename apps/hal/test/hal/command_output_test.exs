@@ -1,0 +1,4 @@
+defmodule Hal.CommandOutputTest do
+  use ExUnit.Case, async: true
+  doctest Hal.CommandOutput
+end

@@ -1,0 +1,251 @@
+defmodule Player do
+  @moduledoc """
+  Turns a configuration file of the Player device server (1.x, 2 or 3), which the thesis's robots
+  used, into a robot file. Pure; `mix robot.import` is its command.
+
+  | Player's driver | becomes | by |
+  |---|---|---|
+  | `rflex`, or `rflex_position`, `rflex_sonar` and its kin | `drive`, `body`, acceleration in `limits` | `Player.RFlexOptions` |
+  | `sonyevid30` | `ptz` | `Player.CameraOptions` |
+  | `camerav4l` and its kin | `camera` | |
+  | `cmvision` | `colours` | |
+
+  `Player.Defaults` and `Player.Boards` derive what follows from several options, and from
+  Player's own defaults.
+
+  Everything else is left out and reported: each option and section with its line and the reason.
+  Units are those of `Player.Units`. If a file says something else than it seems to mean, the
+  assumption is reported as well.
+  """
+  alias Player.{
+    Boards,
+    CameraOptions,
+    Defaults,
+    Parts,
+    RFlexOptions,
+    Sections,
+    State,
+    Units,
+    Unsupported
+  }
+
+  @drivers %{
+    "rflex" => :drive,
+    "sonyevid30" => :ptz,
+    "camerav4l" => :camera,
+    "camerav4l2" => :camera,
+    "camerav4lc" => :camera,
+    "camerauvc" => :camera,
+    "cmvision" => :colours
+  }
+  @modules %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
+  @said ~w(name driver provides requires alwayson plugin key)
+
+  @type result :: %{
+          text: String.t(),
+          id: atom(),
+          profile: :magellan | :atrv_mini,
+          assumed: [State.remark()],
+          left: [State.remark()]
+        }
+
+  @doc """
+  The robot file for a configuration file's text. Options:
+
+    * `:file` - its name, for errors and the head of the new file
+    * `:id` - the robot's name; default `mag1` or `min1`
+    * `:profile` - `:magellan` or `:atrv_mini`; by default guessed
+    * `:version` - 1 or 2 (and later) for Player's; by default found out from the names of its
+      options
+    * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: the path of
+      the colour file for the robot file, and what is in it
+
+  The error is one line. It names what keeps the file from being read, or says that it has no
+  rFLEX driver, or which of its lines leaves open where the robot's sensors are
+  (`Player.Boards.sure/1`).
+  """
+  @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
+  def import(text, options \\ []) do
+    file = Keyword.get(options, :file, "configuration file")
+
+    with {:ok, parsed} <- Sections.parse(text),
+         sections = Parts.join(parsed.sections),
+         units = Units.context(parsed.options, sections, options[:version]),
+         state = Enum.reduce(sections, start(parsed), &section(&1, &2, units)),
+         :ok <- based(state),
+         # The fault of a line itself is reported before the faults that follow from it.
+         :ok <- Boards.sure(state),
+         {profile, state} = finish(state, options),
+         :ok <- Boards.sure(state) do
+      {:ok, result(state, profile, file, options)}
+    else
+      {:error, {line, why}} -> {:error, "#{file}:#{line}: #{why}"}
+      {:error, why} -> {:error, "#{file}: #{why}"}
+    end
+  end
+
+  defp start(parsed) do
+    left =
+      for({line, name} <- parsed.includes) do
+        {line, "include \"#{name}\"",
+         "other files are not read: import that file, or copy its text"}
+      end ++
+        for {name, line, _value} <- parsed.options, name not in ~w(unit_length unit_angle) do
+          {line, name, "says nothing about the robot"}
+        end
+
+    %{values: [], assumed: [], left: left, seen: []}
+  end
+
+  # Older files have position:0 ( driver "rflex" … ), newer ones driver ( name "rflex" … ).
+  defp section(section, state, units) do
+    name = text_of(section, "name") || text_of(section, "driver")
+
+    kind = if name in Parts.names(), do: :drive, else: Map.get(@drivers, name)
+
+    case {section.type, kind} do
+      {"driver", nil} ->
+        left(state, section.line, "driver #{name}", Unsupported.driver(name, names()))
+
+      {type, nil} ->
+        left(state, section.line, type, Unsupported.section(type))
+
+      {_type, kind} ->
+        first(kind, name, section, state, units)
+    end
+  end
+
+  # The plain names first: of two that are equally near, these are suggested.
+  defp names, do: @drivers |> Map.keys() |> Enum.sort()
+
+  defp text_of(section, name) do
+    case List.keyfind(section.options, name, 0) do
+      {_name, _line, text} when is_binary(text) -> text
+      _none -> nil
+    end
+  end
+
+  defp left(state, line, what, why), do: %{state | left: [{line, what, why} | state.left]}
+
+  defp first(kind, name, section, state, units) do
+    if kind in state.seen do
+      left(state, section.line, "driver #{name}", "a robot has one #{kind}; the first is taken")
+    else
+      state = %{state | seen: [kind | state.seen]}
+
+      inner =
+        for inner <- section.sections, do: {inner.line, inner.type, "a driver has no sections"}
+
+      options = Enum.reject(section.options, fn {name, _line, _value} -> name in @said end)
+
+      {options, again} = once(options)
+
+      left = for {name, line, _value} <- again, do: {line, name, "occurs twice; the first counts"}
+
+      Enum.reduce(options, %{state | left: left ++ inner ++ state.left}, fn {name, line, value},
+                                                                            state ->
+        carry(state, {line, name}, carried(kind, name, value, units, section.options))
+      end)
+    end
+  end
+
+  defp once(options) do
+    first = Enum.uniq_by(options, &elem(&1, 0))
+    {first, options -- first}
+  end
+
+  defp carried(kind, name, value, units, others) do
+    cond do
+      is_binary(value) and not plain?(value) -> {:left, "is not plain text"}
+      kind == :drive -> RFlexOptions.option(name, value, units, others)
+      true -> CameraOptions.option(kind, name, value, units)
+    end
+  end
+
+  # Characters that change the direction of writing make a file look different from what it is.
+  defp plain?(text),
+    do: String.printable?(text) and not (text =~ ~r/[\x{202A}-\x{202E}\x{2066}-\x{2069}]/u)
+
+  defp carry(state, _where, :used), do: state
+
+  defp carry(state, {line, name}, {:ok, values}),
+    do: State.keep(state, line, name, values)
+
+  defp carry(state, {line, name}, {:assumed, values, why}),
+    do: state |> State.keep(line, name, values) |> State.assume(line, name, why)
+
+  defp carry(state, {line, name}, {:left, why}),
+    do: left(state, line, name, why)
+
+  defp based(state) do
+    cond do
+      :drive in state.seen ->
+        :ok
+
+      state.left == [] ->
+        {:error, "it has no driver"}
+
+      true ->
+        {:error,
+         "it has no driver \"rflex\", so it is neither for a Magellan Pro nor for an ATRV mini"}
+    end
+  end
+
+  defp finish(state, options) do
+    state = Player.Validate.allowed(state, @modules)
+    {profile, state} = Defaults.profile(state, options[:profile])
+    state = state |> Defaults.complete(profile) |> Boards.complete(profile)
+    {profile, coloured(state, options[:colours])}
+  end
+
+  defp result(state, profile, file, options) do
+    id = options[:id] || if(profile == :magellan, do: :mag1, else: :min1)
+
+    %{
+      text: Player.Render.write(state, file, id, profile, @modules),
+      id: id,
+      profile: profile,
+      assumed: Enum.sort(state.assumed),
+      left: Enum.sort(state.left)
+    }
+  end
+
+  # Without colours there is nothing for our camera to look for.
+  defp coloured(state, read) do
+    file = State.value(state, [:colours, :file])
+
+    cond do
+      file == nil ->
+        blind? = &match?({[kind, _], _, _, _} when kind in [:camera, :colours], &1)
+        State.leave(state, blind?, "a camera needs a driver cmvision with a colorfile")
+
+      read == nil ->
+        state
+
+      true ->
+        looked(state, file, read.(file))
+    end
+  end
+
+  defp looked(state, file, {path, result}) do
+    {at, _, line, option} = List.keyfind(state.values, [:colours, :file], 0)
+    state = %{state | values: List.keyreplace(state.values, at, 0, {at, path, line, option})}
+
+    case result do
+      {:ok, %{classes: [%{name: first} | _] = classes}} ->
+        if Enum.any?(classes, &(&1.name == "YellowLandmark")),
+          do: state,
+          else:
+            state
+            |> State.assume(
+              line,
+              file,
+              "its first colour, #{first}, is taken for the landmark's"
+            )
+            |> State.keep(line, option, [{[:policies, :colour], first}])
+
+      {:error, why} ->
+        left(state, line, option, "the colour file must be corrected: #{why}")
+    end
+  end
+end
