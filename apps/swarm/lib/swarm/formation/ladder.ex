@@ -27,8 +27,10 @@ defmodule Swarm.Formation.Ladder do
   @stride 0.5
   @strides 60
   # The gaps between robots of a cluster, from edge to edge: the first with which all see their leader, else the last.
-  # How many places round the leader are tried.
+  # How many places round the leader are tried, and how much finer they lie where too few of them are free, as in a
+  # corridor hardly wider than a robot.
   @apart [0.6, 0.4]
+  @finer 4
   @most 400
 
   @type rung :: :asked | :turned | :closer | :column | :cluster
@@ -121,10 +123,14 @@ defmodule Swarm.Formation.Ladder do
   end
 
   defp rung(:cluster, asked, followers, here, space) do
-    clusters = for apart <- @apart, spots = cluster(apart, followers, here, space), do: spots
+    clusters = for apart <- @apart, spots = cluster(apart, 1, followers, here, space), do: spots
     leader = Pose.point(here.pose)
     near? = fn spots -> Enum.all?(spots, &Space.joined?(space, &1, leader)) end
-    spots = Enum.find(clusters, near?) || List.last(clusters)
+
+    spots =
+      Enum.find(clusters, near?) || List.last(clusters) ||
+        cluster(List.last(@apart), @finer, followers, here, space)
+
     if spots, do: told(asked, spots)
   end
 
@@ -141,16 +147,23 @@ defmodule Swarm.Formation.Ladder do
     end)
   end
 
-  defp cluster(apart, followers, here, space) do
-    start = Pose.point(here.pose)
-    step = 2 * space.radius + apart
-    found = flood(:gb_sets.singleton({0.0, {0, 0}}), MapSet.new([{0, 0}]), [], step, here, space)
+  # Of a lattice that is `finer` times as fine as robots stand apart, only places that far apart are taken.
+  defp cluster(apart, finer, followers, here, space) do
+    apart = 2 * space.radius + apart
+    open = :gb_sets.singleton({0.0, {0, 0}})
+    limits = {apart / finer, @most * finer * finer}
+    found = flood(open, MapSet.new([{0, 0}]), [], limits, here, space)
 
-    spots =
-      for point <- found |> Enum.reverse() |> List.delete(start) |> Enum.take(followers),
-          do: facing(point, here)
+    {spots, _before} =
+      found
+      |> Enum.reverse()
+      |> Enum.flat_map_reduce([Pose.point(here.pose)], fn point, before ->
+        if Enum.all?(before, &(Pose.distance(&1, point) > apart - 1.0e-6)),
+          do: {[facing(point, here)], [point | before]},
+          else: {[], before}
+      end)
 
-    if length(spots) == followers, do: spots
+    if length(spots) >= followers, do: Enum.take(spots, followers)
   end
 
   defp told(formation, spots), do: {formation, FreeSlots.whole(length(spots)), spots}
@@ -178,8 +191,8 @@ defmodule Swarm.Formation.Ladder do
 
   # Places of a triangular lattice round the leader, in the order of the length of way to them: from each that is free
   # to those beside it. Places that are not free are passed, where a robot can drive through.
-  defp flood(open, seen, found, step, here, space) do
-    if :gb_sets.is_empty(open) or MapSet.size(seen) > @most do
+  defp flood(open, seen, found, {step, most} = limits, here, space) do
+    if :gb_sets.is_empty(open) or MapSet.size(seen) > most do
       found
     else
       {{way, cell}, open} = :gb_sets.take_smallest(open)
@@ -195,7 +208,7 @@ defmodule Swarm.Formation.Ladder do
           {open, seen} -> {:gb_sets.add({way + step, next}, open), MapSet.put(seen, next)}
         end
 
-      flood(open, seen, if(free?, do: [at | found], else: found), step, here, space)
+      flood(open, seen, if(free?, do: [at | found], else: found), limits, here, space)
     end
   end
 

@@ -99,6 +99,23 @@ defmodule Swarm.Formation.LadderTest do
     assert choose({:line, 2.0}, 19, here(Pose.new(0.9, 0.9)), space(cell)) == nil
   end
 
+  test "in a corridor hardly wider than a robot they stand behind one another, wherever its leader looks" do
+    corridor = [
+      {-6.0, 0.5, 6.0, 6.0},
+      {-6.0, -6.0, 6.0, -0.5},
+      {-6.0, -0.5, -5.5, 0.5},
+      {2.5, -0.5, 6.0, 0.5}
+    ]
+
+    for heading <- [0.4, 1.9, 2.8] do
+      assert %{rung: :cluster, spots: spots} =
+               choose({:line, 2.0}, 4, here(Pose.new(2.0, 0.0, heading)), space(corridor))
+
+      xs = spots |> Enum.map(& &1.x) |> Enum.sort()
+      for {a, b} <- Enum.zip(xs, tl(xs) ++ [2.0]), do: assert(b - a > 0.85)
+    end
+  end
+
   test "whatever is chosen in random rooms, all have room, apart, on the leader's side of the walls" do
     rungs =
       for _ <- 1..150 do
