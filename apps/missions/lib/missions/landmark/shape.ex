@@ -31,7 +31,7 @@ defmodule Missions.Landmark.Shape do
   @barred 0.05
 
   # A leader that has moved this far (metres) chooses again when it stands, and one whose shape has not fitted for
-  # this long while it drives.
+  # this long while it drives, or that has found room for none.
   @moved 0.15
   @unfit_ms 1_000
   @on_the_way [:asked, :column]
@@ -100,6 +100,9 @@ defmodule Missions.Landmark.Shape do
         shape = if fits?, do: %{shape | fit_ms: now}, else: shape
 
         cond do
+          shape.rung == nil and moved <= @moved and now - (shape.fit_ms || now) < @unfit_ms ->
+            shape
+
           # A cluster that was chosen without knowing the walls stays until the leader is elsewhere (`relax/2`).
           mission.percept.grid == nil and (fits? or not slow?) ->
             shape
