@@ -126,7 +126,7 @@ defmodule Agents.Conversation do
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)
 
   defp ask(peers, envelope, ms, enough) do
-    now = System.monotonic_time(:millisecond)
+    now = Hal.Clock.now_ms()
     {pending, missing} = post_all(peers, envelope, %{}, [])
     deadline = now + ms
     patience = min(now + @patience_ms, deadline)
@@ -181,7 +181,7 @@ defmodule Agents.Conversation do
         {{peer, _pid}, pending} = Map.pop!(pending, ref)
         collect(answers, pending, [{peer, :gone} | missing], enough, deadline)
     after
-      max(deadline - System.monotonic_time(:millisecond), 0) -> {answers, pending, missing}
+      max(deadline - Hal.Clock.now_ms(), 0) -> {answers, pending, missing}
     end
   end
 

@@ -37,7 +37,7 @@ defmodule Console.Demo do
         scene = trial_module.scene(trial)
         heading = heading(options, scene) <> slow(trial_module, trial)
         Enum.each([heading | lines.(trial)], &Output.line(output, &1))
-        started = System.monotonic_time(:millisecond)
+        started = Hal.Clock.now_ms()
 
         run =
           play(
@@ -58,7 +58,7 @@ defmodule Console.Demo do
           )
 
         Output.finish(output)
-        status = finish(run, options, (System.monotonic_time(:millisecond) - started) / 1000)
+        status = finish(run, options, (Hal.Clock.now_ms() - started) / 1000)
         line = ended.(run.trial) || recorded(run, options, output)
         stop.(run.trial)
         if line, do: refuse(line), else: status

@@ -104,7 +104,7 @@ defmodule Hal.Device do
   """
   @spec arm(GenServer.server()) :: :ok | {:error, line :: String.t()}
   def arm(device),
-    do: order(device, {:arm, System.monotonic_time(:millisecond) + @call_ms - @answer_ms})
+    do: order(device, {:arm, Hal.Clock.now_ms() + @call_ms - @answer_ms})
 
   @doc """
   Stops the wheels until `arm/1`. The error says that the line was lost, so that they cannot be

@@ -86,7 +86,7 @@ defmodule Robot.Recorder do
     # To end the file in order.
     Process.flag(:trap_exit, true)
     queues = Map.new(ids, &{&1, Queue.new(Map.get(options, :bound, 2_000))})
-    now_ms = System.monotonic_time(:millisecond)
+    now_ms = Hal.Clock.now_ms()
 
     s = %{
       ids: ids,
@@ -262,7 +262,7 @@ defmodule Robot.Recorder do
         entries: [],
         count: 0,
         shots: [],
-        tried_ms: System.monotonic_time(:millisecond)
+        tried_ms: Hal.Clock.now_ms()
     }
   end
 

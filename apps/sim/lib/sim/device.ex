@@ -8,7 +8,7 @@ defmodule Sim.Device do
   @spec handle_message(term(), state) :: {:ok, list(), state} | {:error, term(), state}
         when state: %{:line => {pid(), reference()}, :least => term(), optional(atom()) => term()}
   def handle_message({:world, server, {:readings, sent_ms, all}}, %{line: {server, _}} = s) do
-    {late?, least} = Lateness.late?(s.least, sent_ms, System.monotonic_time(:millisecond))
+    {late?, least} = Lateness.late?(s.least, sent_ms, Hal.Clock.now_ms())
     {:ok, if(late?, do: [], else: all), %{s | least: least}}
   end
 

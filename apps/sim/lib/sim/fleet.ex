@@ -110,7 +110,7 @@ defmodule Sim.Fleet do
 
     case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
       {:ok, backend} ->
-        s = begun(setup, {module, backend}, System.monotonic_time(:millisecond))
+        s = begun(setup, {module, backend}, Hal.Clock.now_ms())
         # Before anybody can order something else: this start would take its place.
         if own.mission, do: ask(s, :begin)
         {:ok, s}
@@ -253,7 +253,7 @@ defmodule Sim.Fleet do
 
   # The time of a run stands still when it has ended.
   defp now(%{ended: {_line, at_ms}}), do: at_ms
-  defp now(%{epoch_ms: epoch_ms}), do: System.monotonic_time(:millisecond) - epoch_ms
+  defp now(%{epoch_ms: epoch_ms}), do: Hal.Clock.now_ms() - epoch_ms
 
   defp ask(%{backend: {module, backend}}, what), do: apply(module, what, [backend])
 

@@ -122,12 +122,12 @@ defmodule Bench.Stop.Robot do
     {:running, Wish.new(:roll, Twist.new(speed, 0.0), 0.6), {__MODULE__, speed}}
   end
 
-  defp until(done?, deadline \\ System.monotonic_time(:millisecond) + @deadline_ms) do
+  defp until(done?, deadline \\ Hal.Clock.now_ms() + @deadline_ms) do
     cond do
       done?.() ->
         :ok
 
-      System.monotonic_time(:millisecond) > deadline ->
+      Hal.Clock.now_ms() > deadline ->
         exit(:timeout)
 
       true ->

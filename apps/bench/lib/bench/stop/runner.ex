@@ -37,7 +37,7 @@ defmodule Bench.Stop.Runner do
     tap = {WireTap, to: self(), kind: :magellan}
     {:ok, emulator} = Emulator.start_link(core: tap, link: link)
     free = List.duplicate(5.1, 16)
-    :ok = Emulator.change(emulator, :feel, [{:sonar, free}, System.monotonic_time(:millisecond)])
+    :ok = Emulator.change(emulator, :feel, [{:sonar, free}, Hal.Clock.now_ms()])
     s = %{emulator: emulator, link: link, vm: nil}
 
     {results, s} =
@@ -79,7 +79,7 @@ defmodule Bench.Stop.Runner do
 
   # Waits for full speed, and for a time that is not in step with the ticks.
   defp rolling(s) do
-    roll(s, System.monotonic_time(:millisecond) + @call_ms)
+    roll(s, Hal.Clock.now_ms() + @call_ms)
 
     receive do
     after
@@ -95,7 +95,7 @@ defmodule Bench.Stop.Runner do
 
     cond do
       speed(&(&1 >= @fast), @roll_ms) -> :ok
-      System.monotonic_time(:millisecond) < until_ms -> roll(s, until_ms)
+      Hal.Clock.now_ms() < until_ms -> roll(s, until_ms)
       true -> exit(:does_not_roll)
     end
   end
@@ -173,7 +173,7 @@ defmodule Bench.Stop.Runner do
   end
 
   defp touch(s, pressed) do
-    at_ms = System.monotonic_time(:millisecond)
+    at_ms = Hal.Clock.now_ms()
     :ok = Emulator.change(s.emulator, :feel, [{:bumpers, pressed}, at_ms])
   end
 
@@ -218,7 +218,7 @@ defmodule Bench.Stop.Runner do
   end
 
   # When the wheels were told such a speed, if within this time.
-  defp speed(such?, ms), do: speed_until(such?, System.monotonic_time(:millisecond) + ms)
+  defp speed(such?, ms), do: speed_until(such?, Hal.Clock.now_ms() + ms)
 
   defp speed_until(such?, until_ms) do
     receive do
@@ -228,7 +228,7 @@ defmodule Bench.Stop.Runner do
       {:wire, _other, _at_us} ->
         speed_until(such?, until_ms)
     after
-      max(until_ms - System.monotonic_time(:millisecond), 0) -> nil
+      max(until_ms - Hal.Clock.now_ms(), 0) -> nil
     end
   end
 

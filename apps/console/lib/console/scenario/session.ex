@@ -64,7 +64,7 @@ defmodule Console.Scenario.Session do
     Sim.Trial.Memory.prepare()
     output = Output.to(:stdio)
     unless options.quiet, do: tell(Report.heading(file, run.scenario, run.trial), output)
-    now_ms = System.monotonic_time(:millisecond)
+    now_ms = Hal.Clock.now_ms()
     run = live(run, %{output: output, quiet: options.quiet, told: 0, drawn_ms: now_ms})
     Output.finish(output)
     verdicts = Runner.verdicts(run)

@@ -76,7 +76,7 @@ defmodule Console.Terminal.Session do
       view: %Terminal{
         editor: %{Editor.new(&Prompt.completions(&1, options.robots)) | most: Prompt.most_bytes()}
       },
-      started_ms: System.monotonic_time(:millisecond)
+      started_ms: Hal.Clock.now_ms()
     }
 
     told = page(session, options)
@@ -353,7 +353,7 @@ defmodule Console.Terminal.Session do
   defp finish(session, options) do
     result = session.module.result(session.live)
     formed? = session.module.scene(session.live).formed?
-    wall_s = (System.monotonic_time(:millisecond) - session.started_ms) / 1000
+    wall_s = (Hal.Clock.now_ms() - session.started_ms) / 1000
     Enum.each(Report.summary(result, formed?, wall_s), &Output.line(session.output, &1))
     title = Picture.title(length(options.robots), options.map, options.seed)
     drawing = session.track && fn -> Picture.draw(session.track, title) end

@@ -169,7 +169,7 @@ defmodule Hal.Camera.FFmpeg do
     at_ms =
       if state.every and rate > 0,
         do: div(number * per * 1000 + div(rate, 2), rate),
-        else: System.monotonic_time(:millisecond) - div(age_us, 1000)
+        else: Hal.Clock.now_ms() - div(age_us, 1000)
 
     {:ok, frame} = Frame.new(state.format, width, height, bytes, at_ms)
     frame

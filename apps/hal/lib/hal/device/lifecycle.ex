@@ -91,7 +91,7 @@ defmodule Hal.Device.Lifecycle do
   """
   @spec judge(State.t()) :: State.t()
   def judge(%{inner: {:open, _}} = s) do
-    now_ms = System.monotonic_time(:millisecond)
+    now_ms = Hal.Clock.now_ms()
 
     cond do
       s.due_ms != nil and now_ms - s.due_ms > @asleep_ms ->
@@ -144,7 +144,7 @@ defmodule Hal.Device.Lifecycle do
   def listen(%{inner: {:open, _}} = s) do
     ref = make_ref()
     at_ms = State.now(s)
-    now_ms = System.monotonic_time(:millisecond)
+    now_ms = Hal.Clock.now_ms()
     wait_ms = Liveness.next_ms(s.signs, at_ms) - at_ms
     wait_ms = if s.patient_ms, do: max(s.patient_ms - now_ms, 1), else: wait_ms
     Process.send_after(self(), {:listen, ref}, wait_ms)

@@ -137,7 +137,7 @@ defmodule Hal.Device.Server do
   # Whoever asked has been told by then that nothing was done, and may stand in front of the
   # robot.
   defp order(s, order, until_ms) do
-    if System.monotonic_time(:millisecond) < until_ms,
+    if Hal.Clock.now_ms() < until_ms,
       do: order(s, order),
       else: {{:error, "the drive answers too late"}, s}
   end

@@ -28,7 +28,7 @@ defmodule Hal.HardenedServer.Drops do
   @spec add() :: :ok
   def add do
     {count, due_ms} = counted()
-    now_ms = System.monotonic_time(:millisecond)
+    now_ms = Hal.Clock.now_ms()
 
     if due_ms == nil or now_ms >= due_ms do
       {module, name} = Process.get({__MODULE__, :who}, {nil, self()})

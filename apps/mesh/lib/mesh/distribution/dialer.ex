@@ -35,7 +35,7 @@ defmodule Mesh.Distribution.Dialer do
   @impl GenServer
   def init(options) do
     :ok = :net_kernel.monitor_nodes(true)
-    now = now()
+    now = Hal.Clock.now_ms()
     chance = :rand.seed_s(:exsss, :erlang.phash2(node()))
 
     # A previous dialer may already have been told about nodes.
@@ -57,7 +57,7 @@ defmodule Mesh.Distribution.Dialer do
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
     if node in s.fleet,
-      do: {:noreply, dial(%{s | known: Map.put(s.known, node, row(now()))})},
+      do: {:noreply, dial(%{s | known: Map.put(s.known, node, row(Hal.Clock.now_ms()))})},
       else: {:noreply, s}
   end
 
@@ -71,14 +71,14 @@ defmodule Mesh.Distribution.Dialer do
   end
 
   def handle_info({:nodeup, node}, s) when is_atom(node) do
-    Event.execute([:mesh, :connected], %{at_ms: now()}, %{node: node})
+    Event.execute([:mesh, :connected], %{at_ms: Hal.Clock.now_ms()}, %{node: node})
     Mesh.introduce(node)
     {:noreply, s}
   end
 
   def handle_info({:nodedown, node}, s) when is_atom(node) do
-    Event.execute([:mesh, :disconnected], %{at_ms: now()}, %{node: node})
-    now = now()
+    Event.execute([:mesh, :disconnected], %{at_ms: Hal.Clock.now_ms()}, %{node: node})
+    now = Hal.Clock.now_ms()
 
     known =
       case s.known do
@@ -100,7 +100,7 @@ defmodule Mesh.Distribution.Dialer do
   end
 
   defp dial(s) do
-    now = now()
+    now = Hal.Clock.now_ms()
     busy = Map.values(s.dialling)
 
     wanted(s)
@@ -135,6 +135,4 @@ defmodule Mesh.Distribution.Dialer do
         dialling: Map.put(s.dialling, monitor, node)
     }
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

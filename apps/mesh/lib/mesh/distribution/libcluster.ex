@@ -15,7 +15,9 @@ defmodule Mesh.Distribution.Libcluster do
   @impl GenServer
   def init(topologies) do
     Process.flag(:trap_exit, true)
-    {:ok, %{topologies: topologies, backoff: Backoff.new(now())}, {:continue, :start}}
+
+    {:ok, %{topologies: topologies, backoff: Backoff.new(Hal.Clock.now_ms())},
+     {:continue, :start}}
   end
 
   @impl GenServer
@@ -34,11 +36,9 @@ defmodule Mesh.Distribution.Libcluster do
   end
 
   defp later(s, reason) do
-    Event.execute([:mesh, :libcluster], %{at_ms: now()}, %{reason: reason})
-    backoff = Backoff.tried(s.backoff, now(), 0.5)
+    Event.execute([:mesh, :libcluster], %{at_ms: Hal.Clock.now_ms()}, %{reason: reason})
+    backoff = Backoff.tried(s.backoff, Hal.Clock.now_ms(), 0.5)
     Process.send_after(self(), :start, backoff.due_ms, abs: true)
     %{s | backoff: backoff}
   end
-
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -40,7 +40,8 @@ defmodule Mesh.Distribution.Listener do
     with [name, host] <- :string.split(Atom.to_charlist(node), ~c"@"),
          answer when elem(answer, 0) == :ok <-
            :net_kernel.epmd_module().address_please(name, host, :inet) do
-      not Distribution.Access.there?() or Distribution.Access.reachable?(elem(answer, 1), now())
+      not Distribution.Access.there?() or
+        Distribution.Access.reachable?(elem(answer, 1), Hal.Clock.now_ms())
     else
       _unknown -> false
     end
@@ -115,7 +116,7 @@ defmodule Mesh.Distribution.Listener do
 
   # Asks by both addresses of a connection; one that has gone has none.
   defp ok?(socket, ask) do
-    now = now()
+    now = Hal.Clock.now_ms()
 
     with {:ok, {ip, _port} = from} <- :inet.peername(socket),
          {:ok, {called, _port}} <- :inet.sockname(socket),
@@ -135,5 +136,4 @@ defmodule Mesh.Distribution.Listener do
   end
 
   defp environment(name), do: to_string(:os.getenv(name, ~c""))
-  defp now, do: System.monotonic_time(:millisecond)
 end

@@ -247,7 +247,7 @@ defmodule Robot.Control.Pilot do
   # stopped after the request.
   defp timely(delivery, data) do
     cond do
-      System.monotonic_time(:millisecond) >= delivery.until_ms -> {:error, :late}
+      Hal.Clock.now_ms() >= delivery.until_ms -> {:error, :late}
       Board.latched?(data.board) -> {:error, :held}
       stopped?(delivery.asked, data.board) -> {:error, :stopped}
       true -> :ok

@@ -78,7 +78,7 @@ defmodule Robot.Recorder.Queue do
 
   defp put_under_way(queue, recorder, robot, {role, _kind, _what, _at_ms} = entry) do
     :atomics.add(queue.counters, slot(role, @waiting), 1)
-    send(recorder, {:entry, robot, entry, System.monotonic_time(:millisecond)})
+    send(recorder, {:entry, robot, entry, Hal.Clock.now_ms()})
   end
 
   @doc "The recorder has taken an entry of this role."

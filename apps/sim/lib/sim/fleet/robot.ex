@@ -38,11 +38,11 @@ defmodule Sim.Fleet.Robot do
 
   @doc "A clock for robots: milliseconds since this call."
   @spec clock() :: Robot.Config.call()
-  def clock, do: {__MODULE__, :now, [System.monotonic_time(:millisecond)]}
+  def clock, do: {__MODULE__, :now, [Hal.Clock.now_ms()]}
 
   @doc "The time of such a clock."
   @spec now(integer()) :: non_neg_integer()
-  def now(epoch_ms), do: System.monotonic_time(:millisecond) - epoch_ms
+  def now(epoch_ms), do: Hal.Clock.now_ms() - epoch_ms
 
   @doc """
   Starts its mission, once its drive has armed itself; waits 5 s for that. The error says in a line why
@@ -59,12 +59,12 @@ defmodule Sim.Fleet.Robot do
   till then a robot refuses what would move it.
   """
   @spec await_armed([atom()]) :: :ok
-  def await_armed(ids), do: await_armed(ids, System.monotonic_time(:millisecond) + @armed_ms)
+  def await_armed(ids), do: await_armed(ids, Hal.Clock.now_ms() + @armed_ms)
 
   defp await_armed(ids, until_ms) do
     late = Enum.reject(ids, &armed?/1)
 
-    if late != [] and System.monotonic_time(:millisecond) < until_ms do
+    if late != [] and Hal.Clock.now_ms() < until_ms do
       Process.sleep(@look_ms)
       await_armed(late, until_ms)
     else

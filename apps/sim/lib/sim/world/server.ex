@@ -214,7 +214,7 @@ defmodule Sim.World.Server do
 
   defp tell(devices, device, readings) do
     case devices do
-      %{^device => pid} -> hand(pid, {:readings, System.monotonic_time(:millisecond), readings})
+      %{^device => pid} -> hand(pid, {:readings, Hal.Clock.now_ms(), readings})
       _none -> :ok
     end
   end

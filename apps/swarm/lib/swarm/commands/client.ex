@@ -47,7 +47,7 @@ defmodule Swarm.Commands.Client do
             gather(waiting, request, Map.put(answers, id, answer), deadline)
         end
     after
-      max(deadline - System.monotonic_time(:millisecond), 0) -> give_up(waiting, answers)
+      max(deadline - Hal.Clock.now_ms(), 0) -> give_up(waiting, answers)
     end
   end
 

@@ -67,7 +67,7 @@ defmodule Sim.Fleet.Nodes.Child do
   """
   @spec await_ends([t()]) :: :ok
   def await_ends(children) do
-    await(for(child <- children, do: child.port), System.monotonic_time(:millisecond) + @end_ms)
+    await(for(child <- children, do: child.port), Hal.Clock.now_ms() + @end_ms)
   end
 
   defp await([], _deadline), do: :ok
@@ -76,7 +76,7 @@ defmodule Sim.Fleet.Nodes.Child do
     receive do
       {^port, {:exit_status, _status}} -> await(ports, deadline)
     after
-      max(deadline - System.monotonic_time(:millisecond), 0) -> await(ports, deadline)
+      max(deadline - Hal.Clock.now_ms(), 0) -> await(ports, deadline)
     end
   end
 end
