@@ -39,7 +39,7 @@ defmodule Mesh.Distribution.ConnectionLog do
 
   defp say(event, {whom, who, why}) do
     address = Address.find() || Peer.address()
-    now = Hal.Clock.now_ms()
+    now = System.monotonic_time(:millisecond)
     about = %{refused: whom, who: who, address: address, why: why}
     Event.execute([:mesh, :refused], %{at_ms: now}, about)
     place = "#{who || "a node"} at #{address || "an unknown address"}"

@@ -40,8 +40,7 @@ defmodule Mesh.Distribution.Listener do
     with [name, host] <- :string.split(Atom.to_charlist(node), ~c"@"),
          answer when elem(answer, 0) == :ok <-
            :net_kernel.epmd_module().address_please(name, host, :inet) do
-      not Distribution.Access.there?() or
-        Distribution.Access.reachable?(elem(answer, 1), Hal.Clock.now_ms())
+      not Distribution.Access.there?() or Distribution.Access.reachable?(elem(answer, 1), now())
     else
       _unknown -> false
     end
@@ -116,7 +115,7 @@ defmodule Mesh.Distribution.Listener do
 
   # Asks by both addresses of a connection; one that has gone has none.
   defp ok?(socket, ask) do
-    now = Hal.Clock.now_ms()
+    now = now()
 
     with {:ok, {ip, _port} = from} <- :inet.peername(socket),
          {:ok, {called, _port}} <- :inet.sockname(socket),
@@ -136,4 +135,5 @@ defmodule Mesh.Distribution.Listener do
   end
 
   defp environment(name), do: to_string(:os.getenv(name, ~c""))
+  defp now, do: System.monotonic_time(:millisecond)
 end
