@@ -299,10 +299,16 @@ defmodule Missions.Landmark.Follower do
   end
 
   defp watch(follower, mission, slot, error) do
-    if error < @reach and obstacle?(mission, slot),
+    if walled?(mission.percept, slot) or (error < @reach and obstacle?(mission, slot)),
       do: %{follower | obstacle_ms: follower.obstacle_ms || mission.now_ms},
       else: %{follower | obstacle_ms: nil}
   end
+
+  # The leader has seen less of the walls there.
+  defp walled?(%{grid: %{closed?: false} = grid, profile: profile}, slot),
+    do: not Grid.free?(grid, Pose.point(slot), profile.radius)
+
+  defp walled?(_percept, _slot), do: false
 
   # Something that the sonars see where this robot should stand, and that nobody has reported.
   defp obstacle?(%{percept: percept, anchor: anchor}, slot) do

@@ -96,7 +96,8 @@ defmodule Missions.Landmark.Shape do
       {formation, followers, squeeze, at} when {formation, followers, squeeze} == asked ->
         moved = Pose.distance(at, pose)
         shape = prove(shape, mission)
-        fits? = fits?(shape, here, space)
+        # Where all stand there is room, whatever sonars seem to see later.
+        fits? = match?(%{formed?: true}, mission.leadership) or fits?(shape, here, space)
         shape = if fits?, do: %{shape | fit_ms: now}, else: shape
 
         cond do
@@ -320,7 +321,8 @@ defmodule Missions.Landmark.Shape do
       blocked >= @many and 2 * blocked >= length(followers) ->
         max(last(mission) - shape.squeeze, 1)
 
-      blocked > 0 and Enum.all?(followers, rest?) ->
+      # In a cluster only who is blocked gets another place.
+      blocked > 0 and (shape.rung == :cluster or Enum.all?(followers, rest?)) ->
         1
 
       true ->

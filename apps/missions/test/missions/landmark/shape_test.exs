@@ -72,6 +72,9 @@ defmodule Missions.Landmark.ShapeTest do
     assert [^a, other, ^c, ^d] = later.spots
     for spot <- [a, b, c, d], do: assert(Pose.distance(other, spot) > 0.5)
 
+    # Who is still on the way keeps its place, too, and nobody waits for it.
+    assert run([claims(@ids), claims([:mag3])]).spots == later.spots
+
     # It learns of each.
     again = run([claims(@ids), claims([:mag3]) |> rest(), claims([:mag3]) |> rest()])
     assert [^a, another, ^c, ^d] = again.spots
@@ -89,6 +92,18 @@ defmodule Missions.Landmark.ShapeTest do
     stood = Shape.update(shape, there, 1.6)
     assert Shape.update(stood, walled.(there), 1.6).spots == shape.spots
     assert Shape.update(shape, walled.(mission(claims([]), 10_000)), 1.6).spots != shape.spots
+  end
+
+  test "the shape that was asked for is kept while all stand in it, whatever sonars see there later" do
+    wall = &Grid.new(<<1>>, {1, 1}, 6.0, &1, closed?: false)
+    knows = &put_in(mission(claims([]) |> rest(), &1).percept.grid, wall.(&2))
+    shape = Shape.update(Shape.new(), knows.(9_000, {9.0, 9.0}), 1.6)
+    walled = knows.(10_000, {-7.0, -3.0})
+
+    assert shape.room == {5, [1, 2, 3, 4]}
+    refute match?(%{rung: :asked, room: {5, _}}, Shape.update(shape, walled, 1.6))
+    formed = %{walled | leadership: %Landmark.Leader{formed?: true}}
+    assert %{rung: :asked, room: {5, [1, 2, 3, 4]}} = Shape.update(shape, formed, 1.6)
   end
 
   test "after the last spacing comes the column along its way, then the cluster" do
