@@ -23,6 +23,8 @@ defmodule Robot.Localiser do
   # The frame of a leader is that of the plan if its pose is as sure as this (m2, rad2).
   @planned 0.15 * 0.15
   @aligned 0.06 * 0.06
+  # So sure must the leader be of its heading for a robot that knows its place in the plan itself (rad2).
+  @nearly 0.12 * 0.12
   # A robot that was started again on its way has found its place when it knows it by this (m).
   @found_radius 1.0
 
@@ -40,6 +42,7 @@ defmodule Robot.Localiser do
                 frame: nil,
                 frame_no: nil,
                 turn_check: nil,
+                plan?: false,
                 walls: %Walls{}
               ]
 
@@ -49,7 +52,8 @@ defmodule Robot.Localiser do
   @typedoc """
   `frame` is the frame of the belief, `nil` for that of the start poses. `frame_no` numbers the
   frames that this robot's own poses define for others: it changes when the robot is started, when
-  it comes into another frame, and when it gets marks after it had none.
+  it comes into another frame, and when it gets marks after it had none. `plan?` says that a floor plan corrected it
+  before it was led, and was right.
   """
   @type t :: %__MODULE__{
           start: Pose.t(),
@@ -64,6 +68,7 @@ defmodule Robot.Localiser do
           frame: Anchors.frame() | nil,
           frame_no: non_neg_integer() | nil,
           turn_check: TurnCheck.t(),
+          plan?: boolean(),
           walls: Walls.t()
         }
 
@@ -115,6 +120,9 @@ defmodule Robot.Localiser do
   # The marks of the former frame mean nothing in the new one.
   defp change(localiser, frame) do
     {position, heading} = between(localiser.frame, frame)
+
+    # Who knows its place in the plan need not be turned into the frame of a leader that knows its own there.
+    heading = if localiser.plan? and planned?(frame, @nearly), do: 0.0, else: heading
 
     belief =
       localiser.belief
@@ -209,6 +217,7 @@ defmodule Robot.Localiser do
         odometry: nil,
         history: History.new(),
         turn_check: nil,
+        plan?: false,
         walls: %Walls{},
         belief: Belief.doubt(localiser.belief)
     }
@@ -259,20 +268,24 @@ defmodule Robot.Localiser do
   and in that of a leader that knows where it is in there.
   """
   @spec by_walls?(t()) :: boolean()
-  def by_walls?(%__MODULE__{frame: frame, anchors: anchors}),
-    do: anchors.walls? and planned?(frame)
+  def by_walls?(%__MODULE__{frame: frame, anchors: anchors, plan?: plan?}),
+    do: anchors.walls? and planned?(frame, if(plan?, do: @nearly, else: @aligned))
 
   defp hear(localiser, percept) do
     if by_walls?(localiser) do
       {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
-      %{localiser | walls: walls, belief: belief}
+      kept? = localiser.frame != nil or walls.vague?
+      plan? = if kept?, do: localiser.plan?, else: Walls.right?(walls)
+      %{localiser | walls: walls, belief: belief, plan?: plan?}
     else
       %{localiser | walls: %Walls{}}
     end
   end
 
-  defp planned?(nil), do: true
-  defp planned?(%{start: {position, heading}}), do: position <= @planned and heading <= @aligned
+  defp planned?(nil, _aligned), do: true
+
+  defp planned?(%{start: {position, heading}}, aligned),
+    do: position <= @planned and heading <= aligned
 
   # A robot that was never led: nobody knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do

@@ -29,14 +29,27 @@ defmodule Robot.Localiser.Walls do
   # The standard deviation of a range (metres), several times that of a sonar, and how exact a plan is.
   @sd 0.15
   @exact 0.04
-  # A pose that is less sure than this (metres, radians) is not corrected: it would expect other walls than those that it hears.
+  # A pose that is less sure than this (metres, radians) may expect other walls than those that it hears. It is corrected
+  # once readings have shown that it was right all the same, as well as those of a pose that is known by `@right`.
   @vague {1.0, 0.8}
+  @right 0.3
   @gate 9.0
+  # The evidence by which readings have shown that a plan is right.
+  @shown 40.0
 
-  defstruct at: nil, dead: nil, trust: %Trust{}
+  defstruct at: nil, dead: nil, trust: %Trust{}, vague?: false
 
-  @typedoc "`at` is the odometry at the last round."
-  @type t :: %__MODULE__{at: Pose.t() | nil, dead: Belief.t() | nil, trust: Trust.t()}
+  @typedoc "`at` is the odometry at the last round, at which the pose was `vague?` or not."
+  @type t :: %__MODULE__{
+          at: Pose.t() | nil,
+          dead: Belief.t() | nil,
+          trust: Trust.t(),
+          vague?: boolean()
+        }
+
+  @doc "Whether readings have shown that the plan is right, which is trusted before there are any."
+  @spec right?(t()) :: boolean()
+  def right?(%__MODULE__{trust: trust}), do: trust.trusted? and trust.could >= @shown
 
   @doc "The belief corrected by the percept's sonars, if its `grid` is a floor plan and a round is due."
   @spec correct(t(), Belief.t(), Percept.t()) :: {t(), Belief.t()}
@@ -63,13 +76,13 @@ defmodule Robot.Localiser.Walls do
     do: abs(odometry.twist.turn) * profile.sonar_round_s > @blurred
 
   defp listen(walls, belief, percept) do
-    if vague?(belief) do
-      {walls, belief}
-    else
-      {corrected, got, could} = round(belief, percept)
-      {verdict, trust} = Trust.weigh(walls.trust, got, could)
-      follow(verdict, %{walls | trust: trust}, belief, corrected, walls.trust.trusted?)
-    end
+    vague? = vague?(belief)
+    walls = if vague? and not walls.vague?, do: %{walls | trust: Trust.none()}, else: walls
+    walls = %{walls | vague?: vague?}
+    {corrected, got, could} = round(belief, percept, if(vague?, do: @right * @right))
+    {verdict, trust} = Trust.weigh(walls.trust, got, could)
+    verdict = if vague? and verdict == :fair, do: :unfair, else: verdict
+    follow(verdict, %{walls | trust: trust}, belief, corrected, walls.trust.trusted?)
   end
 
   defp vague?(belief) do
@@ -87,7 +100,8 @@ defmodule Robot.Localiser.Walls do
   defp follow(:wrong, walls, belief, _corrected, false), do: {%{walls | dead: belief}, belief}
 
   # One reading after the other, so that the second one by the same wall is expected where the first one was.
-  defp round(belief, %{profile: profile, odometry: odometry} = percept) do
+  # `most` is the variance (m2) that is expected at most; `nil` is more than any number.
+  defp round(belief, %{profile: profile, odometry: odometry} = percept, most) do
     late = odometry.twist.linear * profile.sonar_round_s / 2
     noise = @sd * @sd + late * late
 
@@ -100,7 +114,7 @@ defmodule Robot.Localiser.Walls do
       {now, got, could} ->
         slope = slope(belief.pose, sonar, normal)
         variance = Belief.variance(now, slope)
-        s = variance + noise
+        s = min(variance, most) + noise
         error = range - distance - along(slope, belief.pose, now.pose)
 
         corrected =

@@ -2,7 +2,7 @@ defmodule Robot.Localiser.WallsTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Robot.{Localiser, Room}
-  alias Robot.Localiser.Anchors
+  alias Robot.Localiser.{Anchors, Covariance}
 
   @size {6.0, 4.0}
   @start Pose.new(1.0, 1.0)
@@ -69,6 +69,45 @@ defmodule Robot.Localiser.WallsTest do
       assert off < dead + 0.2
       assert radius > 0.8 * dead_radius
     end
+  end
+
+  test "a pose that has become vague is corrected again once readings show that it was right, and no other" do
+    {_off, _radius, localiser} = follow(drive(1), Room.plan(@size))
+
+    vague = fn pose, belief ->
+      covariance = Covariance.add(belief.covariance, [9.0, 9.0, 0.01])
+      %{belief | pose: pose, covariance: covariance}
+    end
+
+    again = Enum.drop(drive(2), length(drive(1)))
+    right = update_in(localiser.belief, &vague.(&1.pose, &1))
+    {off, radius, _localiser} = follow(again, Room.plan(@size), right)
+    assert off < 0.2 and radius < 0.5
+
+    # It may find its place, or know that it has not.
+    wrong =
+      update_in(
+        localiser.belief,
+        &vague.(Pose.new(&1.pose.x + 1.3, &1.pose.y + 0.9, &1.pose.heading), &1)
+      )
+
+    {off, radius, _localiser} = follow(again, Room.plan(@size), wrong)
+    assert off < radius
+  end
+
+  test "who knows its place by the plan is not turned into the frame of a leader that does, too" do
+    {_off, _radius, localiser} = follow(drive(1), Room.plan(@size))
+    zeros = %{base: nil, at: {25.0, 1.0}, drift: {0.0, 0.0, 0.0}, slip: 0.0, key: {:mag1, 1, 1}}
+
+    worst = fn localiser, heading ->
+      sure = %{position: 1.0e-4, heading: heading, start: {1.0e-4, heading}}
+      led = Localiser.anchors(localiser, %Anchors{frame: Map.merge(zeros, sure)})
+      led.belief |> Localiser.Belief.sd() |> elem(0)
+    end
+
+    assert worst.(localiser, 0.01) < 0.2
+    assert worst.(localiser, 0.04) > 2.0
+    assert worst.(%{localiser | plan?: false}, 0.01) > 2.0
   end
 
   test "corrects a follower of a leader that knows its place by the plan, and of no other" do

@@ -42,6 +42,10 @@ defmodule Robot.Localiser.Walls.Trust do
     :math.log((1 - @stray) * likely / @any + @stray)
   end
 
+  @doc "Of a robot to which readings must show again that it is where it believes to be."
+  @spec none() :: t()
+  def none, do: %__MODULE__{got: 0.0, could: 0.0, trusted?: false}
+
   @doc "Weighs a round of readings by the evidence that it gave, and that it could have given."
   @spec weigh(t(), got :: float(), could :: float()) :: {verdict(), t()}
   def weigh(trust, got, could) do
