@@ -26,9 +26,10 @@ defmodule Missions.Landmark.SelfReport do
       uncertainty: uncertainty(mission.percept),
       in_place: mission.phase == :follow and mission.follower.in_place?,
       unsure: mission.phase == :follow and mission.follower.unsure?,
-      blocked: mission.phase == :follow and mission.follower.blocked?,
+      blocked: mission.phase == :follow and mission.follower.progress.blocked?,
       says: says(mission),
-      blocked_by: if(mission.phase == :follow, do: Blocker.words(mission.follower.blocker)),
+      blocked_by:
+        if(mission.phase == :follow, do: Blocker.words(mission.follower.progress.blocker)),
       formed: leading? and mission.leadership.formed?,
       anchor: if(leading?, do: mission.anchor)
     }

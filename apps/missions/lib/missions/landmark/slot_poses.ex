@@ -8,7 +8,7 @@ defmodule Missions.Landmark.SlotPoses do
   """
   alias Hal.{Pose, Twist}
   alias Swarm.Formation
-  alias Missions.Landmark.Reference
+  alias Missions.Landmark.{LandmarkTrack, Reference}
 
   @ahead_ms 500
   @default_distance 1.2
@@ -38,6 +38,10 @@ defmodule Missions.Landmark.SlotPoses do
   @spec landmark(Reference.t()) :: Pose.point() | nil
   def landmark(%Reference{landmark: nil}), do: nil
   def landmark(%Reference{landmark: {x, y}}), do: {x / 1000, y / 1000}
+
+  @doc "The landmark of an anchor as a disc that nobody drives through, if there is one (metres)."
+  @spec discs(Reference.t()) :: [{x :: float(), y :: float(), radius :: float()}]
+  def discs(anchor), do: for({x, y} <- [landmark(anchor)], do: {x, y, LandmarkTrack.radius()})
 
   @doc """
   All used slots, `{number, pose}` in the order of the robots, as the leader of the anchor intends them, when it stands at

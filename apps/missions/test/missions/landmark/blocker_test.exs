@@ -88,17 +88,18 @@ defmodule Missions.Landmark.BlockerTest do
   end
 
   test "a follower that gets no nearer for 15 s is blocked, wherever it is, and names the blocker" do
-    refute stand(3.0, 14, nil).follower.blocked?
-    assert %{blocked?: true, blocker: :no_way} = stand(3.0, 16, nil).follower
-    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}).follower
+    refute stand(3.0, 14, nil).follower.progress.blocked?
+    assert %{blocked?: true, blocker: :no_way} = stand(3.0, 16, nil).follower.progress
+    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}).follower.progress
   end
 
   test "a slot that trembles by decimetres does not hide the block" do
-    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}, 150).follower
+    assert %{blocked?: true, blocker: :landmark} = stand(3.0, 16, {500, 0}, 150).follower.progress
   end
 
   test "a follower in its place is not blocked" do
-    assert %{blocked?: false, blocker: nil, in_place?: true} = stand(0.1, 30, nil).follower
+    assert %{progress: %{blocked?: false, blocker: nil}, in_place?: true} =
+             stand(0.1, 30, nil).follower
   end
 
   test "heartbeats say that a robot is blocked, but not by what" do

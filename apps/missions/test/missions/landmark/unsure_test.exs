@@ -73,24 +73,27 @@ defmodule Missions.Landmark.UnsureTest do
   end
 
   test "one that stays unsure turns to its leader if no wall is between, and one that is sure does not" do
-    assert stand(0.1, 0.62, 3, room(nil)).facing == nil
-    assert {_slot, heading} = stand(0.1, 0.62, 5, room(nil)).facing
+    assert stand(0.1, 0.62, 3, room(nil)).facing.toward == nil
+    assert {_slot, heading} = stand(0.1, 0.62, 5, room(nil)).facing.toward
     assert_in_delta heading, 0.0, 1.0e-6
-    assert stand(0.1, 0.3, 5, room(nil)).facing == nil
-    assert stand(0.1, 0.62, 5, room(25)).facing == nil
+    assert stand(0.1, 0.3, 5, room(nil)).facing.toward == nil
+    assert stand(0.1, 0.62, 5, room(25)).facing.toward == nil
     # Without walls it would not know whom they hide.
-    assert stand(0.1, 0.62, 5).facing == nil
+    assert stand(0.1, 0.62, 5).facing.toward == nil
   end
 
   test "it reports unsure, and neither in place nor blocked" do
     assert %{unsure?: true, in_place?: false} = stand(0.1, 0.62, 1)
-    assert %{unsure?: true, blocked?: false, blocker: nil, late: []} = stand(0.1, 0.62, 30)
+
+    assert %{unsure?: true, progress: %{blocked?: false, blocker: nil, late: []}} =
+             stand(0.1, 0.62, 30)
+
     assert %{unsure?: false, in_place?: true} = stand(0.1, 0.3, 1)
   end
 
   test "a robot that is still on its way, or does not get there, is not unsure" do
     assert %{unsure?: false} = stand(0.6, 0.62, 1)
-    assert %{unsure?: false, blocked?: true} = stand(0.6, 0.62, 16)
+    assert %{unsure?: false, progress: %{blocked?: true}} = stand(0.6, 0.62, 16)
   end
 
   test "heartbeats carry the word unsure, and no other value in its place" do
@@ -127,22 +130,22 @@ defmodule Missions.Landmark.UnsureTest do
 
   test "an estimate that comes nearer by less than it may be mistaken by is no progress" do
     off = fn seconds -> Enum.at([0.9, 0.75, 0.6], trunc(seconds / 6)) end
-    assert %{blocked?: false} = watch(off, 1.3, 14)
-    assert %{blocked?: true, in_place?: false, unsure?: false} = watch(off, 1.3, 16)
+    assert %{progress: %{blocked?: false}} = watch(off, 1.3, 14)
+    assert %{progress: %{blocked?: true}, in_place?: false, unsure?: false} = watch(off, 1.3, 16)
     # A robot that is sure has come nearer twice.
-    assert %{blocked?: false} = watch(off, 0.1, 16)
+    assert %{progress: %{blocked?: false}} = watch(off, 0.1, 16)
   end
 
   test "a robot that drives is not blocked, however unsure it is of its place" do
     for seconds <- 1..25,
-        do: assert(%{blocked?: false} = watch(&(6.0 - 0.2 * &1), 12.0, seconds))
+        do: assert(%{progress: %{blocked?: false}} = watch(&(6.0 - 0.2 * &1), 12.0, seconds))
   end
 
   test "a robot whose wheels stand is blocked, however its pose is corrected" do
     off = &(3.0 - 0.1 * &1)
-    assert %{blocked?: false} = watch(off, 0.1, 14, nil, :stand)
-    assert %{blocked?: true} = watch(off, 0.1, 16, nil, :stand)
-    assert %{blocked?: false} = watch(off, 0.1, 16)
+    assert %{progress: %{blocked?: false}} = watch(off, 0.1, 14, nil, :stand)
+    assert %{progress: %{blocked?: true}} = watch(off, 0.1, 16, nil, :stand)
+    assert %{progress: %{blocked?: false}} = watch(off, 0.1, 16)
   end
 
   test "the shape does not close up for an unsure robot, and closes up for a blocked one in spite of it" do
