@@ -53,6 +53,31 @@ defmodule System.LayersTest do
     end
   end
 
+  test "what has no moduledoc is called by its own app alone" do
+    owners =
+      for {app, _description, _version} <- Application.loaded_applications(),
+          File.dir?(Path.join([@root, "apps", "#{app}"])),
+          {:ok, modules} = :application.get_key(app, :modules),
+          module <- modules,
+          into: %{},
+          do: {module, app}
+
+    hidden =
+      for {module, _app} <- owners,
+          match?({:docs_v1, _, _, _, :hidden, _, _}, Code.fetch_docs(module)),
+          into: MapSet.new(),
+          do: module
+
+    assert MapSet.size(hidden) > 200
+
+    assert for(
+             {module, app} <- owners,
+             called <- calls(module),
+             called in hidden and owners[called] != app,
+             do: {module, called}
+           ) == []
+  end
+
   # The last names of all aliases of a file, with their lines.
   defp aliases(file) do
     {_ast, names} =

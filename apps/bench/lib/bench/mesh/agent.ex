@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.Agent do
-  @moduledoc """
-  Answers on a robot (`Agents.Responder`), to be measured, and takes part in rounds in which each writes to every other.
-  To start a round, ask all with `{:round, others}`; an agent answers when it has heard from all others.
-  """
+  @moduledoc false
+  # Answers on a robot (`Agents.Responder`), to be measured, and takes part in rounds in which each writes to every other.
+  # To start a round, ask all with `{:round, others}`; an agent answers when it has heard from all others.
   @behaviour Agents.Responder
   alias Agents.{Conversation, Envelope}
 

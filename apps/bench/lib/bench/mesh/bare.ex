@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.Bare do
-  @moduledoc """
-  Measures the same on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that its nodes load little of
-  Elixir.
-  """
+  @moduledoc false
+  # Measures the same on bare OTP: processes, `:pg`, `send`. Written in Erlang's style, so that its nodes load little of
+  # Elixir.
   alias Bench.Mesh.Watch
 
   @scope :bare

@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.Convoy do
-  @moduledoc """
-  Describes what runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
-  the measurement, in the node that asks. Called over standard input.
-  """
+  @moduledoc false
+  # Describes what runs in the measured nodes: complete robots on stationary wheels, with the real mesh; and
+  # the measurement, in the node that asks. Called over standard input.
   alias Bench.Mesh.{IdleDrive, Watch}
   alias Agents.{Conversation, Envelope}
   alias Swarm.{Commands, Directory}

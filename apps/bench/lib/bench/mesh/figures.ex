@@ -1,9 +1,8 @@
 defmodule Bench.Mesh.Figures do
-  @moduledoc """
-  Reduces many measurements to two figures. Pure. The first is the median of the batches' medians,
-  so that a disturbance of one batch does not count; the second covers all measurements, so that
-  nothing is hidden.
-  """
+  @moduledoc false
+  # Reduces many measurements to two figures. Pure. The first is the median of the batches' medians,
+  # so that a disturbance of one batch does not count; the second covers all measurements, so that
+  # nothing is hidden.
   alias Bench.Table
 
   # With fewer values the 99th percentile is simply the largest.

@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.IdleDrive do
-  @moduledoc """
-  Stands in for a drive without a world: its wheels stand still and report that ten times a second. Its sonars report,
-  but see nothing.
-  """
+  @moduledoc false
+  # Stands in for a drive without a world: its wheels stand still and report that ten times a second. Its sonars report,
+  # but see nothing.
   @behaviour Hal.Drive
   alias Hal.{Odometry, Pose, Twist}
 

@@ -1,7 +1,6 @@
 defmodule Bench.Mesh.Nodes do
-  @moduledoc """
-  Starts the nodes to measure, each a `Vm` of its own: this process is not part of the measurement.
-  """
+  @moduledoc false
+  # Starts the nodes to measure, each a `Vm` of its own: this process is not part of the measurement.
   alias Bench.Mesh.{Bare, Convoy, Watch}
   alias Mesh.Secret
 

@@ -1,11 +1,10 @@
 defmodule Bench.Mesh.Runner do
-  @moduledoc """
-  Measures one fleet: N nodes with a robot each and a base that asks, or one node with many. Bare
-  OTP runs first and ends before ours starts, so that neither disturbs the other.
-
-  Fast cases are repeated many times inside the nodes; slow ones (a start, a death) are done a few
-  times from here.
-  """
+  @moduledoc false
+  # Measures one fleet: N nodes with a robot each and a base that asks, or one node with many. Bare
+  # OTP runs first and ends before ours starts, so that neither disturbs the other.
+  #
+  # Fast cases are repeated many times inside the nodes; slow ones (a start, a death) are done a few
+  # times from here.
   alias Bench.Mesh
   alias Bench.Mesh.{Bare, Figures, Nodes}
 

@@ -1,8 +1,7 @@
 defmodule Bench.Mesh.Watch do
-  @moduledoc """
-  Records on a node when it is notified of something, by the clock that all processes of a machine share. It is queried
-  over standard input, so that queries do not use what is measured.
-  """
+  @moduledoc false
+  # Records on a node when it is notified of something, by the clock that all processes of a machine share. It is queried
+  # over standard input, so that queries do not use what is measured.
 
   @doc """
   Starts the process and calls `begin`, without an argument, in it. `see` turns a message into the

@@ -1,9 +1,8 @@
 defmodule Bench.Stop.Reader do
-  @moduledoc """
-  Reads the line of an rFLEX base for speeds and bumpers, and nothing else, from the fact sheet
-  alone (sections 2, 4 and 7): it shares no code with the driver or the emulated base, so that
-  their mistakes cannot hide from it. Pure.
-  """
+  @moduledoc false
+  # Reads the line of an rFLEX base for speeds and bumpers, and nothing else, from the fact sheet
+  # alone (sections 2, 4 and 7): it shares no code with the driver or the emulated base, so that
+  # their mistakes cannot hide from it. Pure.
   import Bitwise
 
   @type event ::

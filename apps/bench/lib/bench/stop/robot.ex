@@ -1,8 +1,7 @@
 defmodule Bench.Stop.Robot do
-  @moduledoc """
-  Runs the robot that is measured, in a VM of its own: the whole tree, with the driver of real bases on a serial line,
-  armed by hand as real robots are. Its mission drives straight on, and raises on command. Called over standard input.
-  """
+  @moduledoc false
+  # Runs the robot that is measured, in a VM of its own: the whole tree, with the driver of real bases on a serial line,
+  # armed by hand as real robots are. Its mission drives straight on, and raises on command. Called over standard input.
   @behaviour Robot.Behaviour
   alias Bench.Stop.WireTap
   alias Hal.{Device, Event, Twist}

@@ -1,10 +1,9 @@
 defmodule Bench.Stop.Runner do
-  @moduledoc """
-  Carries out the cases of `Bench.Stop`: an emulated base with a wire tap at one end of a
-  pseudo-terminal, a robot in a VM of its own at the other. Times are microseconds from before the
-  cause is triggered, so that they include the path to it; for a crash they count from the crash
-  itself, and for a bumper from the base's report of it.
-  """
+  @moduledoc false
+  # Carries out the cases of `Bench.Stop`: an emulated base with a wire tap at one end of a
+  # pseudo-terminal, a robot in a VM of its own at the other. Times are microseconds from before the
+  # cause is triggered, so that they include the path to it; for a crash they count from the crash
+  # itself, and for a bumper from the base's report of it.
   alias Bench.Stop
   alias Bench.Stop.{Robot, WireTap}
   alias Sim.Emulator

@@ -1,8 +1,7 @@
 defmodule Bench.Stop.WireTap do
-  @moduledoc """
-  Taps the emulated base at its end of the line (`Bench.Stop.Reader`): each speed that it receives, and each input that
-  it reports, is sent at once to the process of the option `:to`, as `{:wire, event, at_us}`.
-  """
+  @moduledoc false
+  # Taps the emulated base at its end of the line (`Bench.Stop.Reader`): each speed that it receives, and each input that
+  # it reports, is sent at once to the process of the option `:to`, as `{:wire, event, at_us}`.
   @behaviour Sim.Emulator.Core
   alias Bench.Stop.Reader
   alias Sim.Emulator.RFlexController

@@ -1,12 +1,11 @@
 defmodule Bench.Vision.Beside do
-  @moduledoc """
-  Runs a program of somebody else that searches the same frames in the same run, such as OpenCV from Python, or CMVision
-  where somebody has it.
-
-  It is called as `PROGRAM FRAMES LIMITS WIDTH HEIGHT COUNT`: a file of COUNT yuyv frames, and one
-  with a line `ylow yhigh ulow uhigh vlow vhigh` for each class. It prints the microseconds that
-  each frame took, one a line. The smallest area is 20 pixels.
-  """
+  @moduledoc false
+  # Runs a program of somebody else that searches the same frames in the same run, such as OpenCV from Python, or CMVision
+  # where somebody has it.
+  #
+  # It is called as `PROGRAM FRAMES LIMITS WIDTH HEIGHT COUNT`: a file of COUNT yuyv frames, and one
+  # with a line `ylow yhigh ulow uhigh vlow vhigh` for each class. It prints the microseconds that
+  # each frame took, one a line. The smallest area is 20 pixels.
 
   # The classical pipeline, for each class; the planes are made once a frame. Four neighbours, as
   # in our backends.

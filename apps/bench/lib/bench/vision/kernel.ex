@@ -1,9 +1,8 @@
 defmodule Bench.Vision.Kernel do
-  @moduledoc """
-  Times the C code of `Vision.Backend.Native` without the call from Elixir, and a `memcpy` of the
-  same frames: in this VM, on the same scheduler, with the code and the compiler's options of the
-  vision app. It is not in the vision app, because robots do not need it.
-  """
+  @moduledoc false
+  # Times the C code of `Vision.Backend.Native` without the call from Elixir, and a `memcpy` of the
+  # same frames: in this VM, on the same scheduler, with the code and the compiler's options of the
+  # vision app. It is not in the vision app, because robots do not need it.
   use Hal.Nif, app: :bench, library: "kernel"
 
   @doc "Searches yuyv frames; nanoseconds and number of regions of each, from the last to the first."

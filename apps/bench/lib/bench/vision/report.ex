@@ -1,8 +1,7 @@
 defmodule Bench.Vision.Report do
-  @moduledoc """
-  Shows what `mix bench vision` measured, as a table in Markdown and as a term for JSON. Pure. Ratios are
-  to the kernel; each is the median of the rounds' ratios.
-  """
+  @moduledoc false
+  # Shows what `mix bench vision` measured, as a table in Markdown and as a term for JSON. Pure. Ratios are
+  # to the kernel; each is the median of the rounds' ratios.
   alias Bench.{Table, Vision}
   alias Console.Cli.Format
 

@@ -1,11 +1,10 @@
 defmodule Bench.Vision.Runner do
-  @moduledoc """
-  Measures the ways of `Bench.Vision` in rounds: in each round each way searches all copies of a
-  frame, one way after the other, so that a disturbance meets all of them. Slow ways take part in
-  each fourth round, for a short time.
-
-  A round's figure is the median of its frames. Times are microseconds.
-  """
+  @moduledoc false
+  # Measures the ways of `Bench.Vision` in rounds: in each round each way searches all copies of a
+  # frame, one way after the other, so that a disturbance meets all of them. Slow ways take part in
+  # each fourth round, for a short time.
+  #
+  # A round's figure is the median of its frames. Times are microseconds.
   alias Bench.Vision.Beside
   alias Vision.Backend.Native
 

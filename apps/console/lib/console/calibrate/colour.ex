@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.Colour do
-  @moduledoc """
-  Runs `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their effect in that
-  picture, and writes the colour file.
-  """
+  @moduledoc false
+  # Runs `mix calibrate colour`: derives the limits of a colour from places in a picture, shows their effect in that
+  # picture, and writes the colour file.
   alias Console.Calibrate.{ColourOptions, Frames, StdinPrompt}
   alias Console.Cli.{Diff, Format, OutFile}
   alias Vision.Calibration

@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.ColourOptions do
-  @moduledoc """
-  Reads the command line of `mix calibrate colour`: turns its arguments into a checked map or error
-  lines. Pure.
-  """
+  @moduledoc false
+  # Reads the command line of `mix calibrate colour`: turns its arguments into a checked map or error
+  # lines. Pure.
   alias Console.Cli
   alias Console.Cli.Parse
 

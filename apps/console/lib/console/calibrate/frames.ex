@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.Frames do
-  @moduledoc """
-  Takes frames to calibrate a colour by: from any source that ffmpeg reads, or from a simulated camera (`sim`), which
-  sees the yellow landmark at 2 m and a red robot beside it.
-  """
+  @moduledoc false
+  # Takes frames to calibrate a colour by: from any source that ffmpeg reads, or from a simulated camera (`sim`), which
+  # sees the yellow landmark at 2 m and a red robot beside it.
   alias Hal.Camera.Source
   alias Hal.{Frame, Pose, Profile}
   alias Sim.World

@@ -1,10 +1,9 @@
 defmodule Console.Calibrate.Live do
-  @moduledoc """
-  Drives a robot of this node along one course, through everything between a wish and its wheels:
-  mission, executive, gate, device. A person starts each course; the wheels are armed for this
-  course alone. Any input meanwhile is an emergency stop, which holds until the person types
-  `reset`.
-  """
+  @moduledoc false
+  # Drives a robot of this node along one course, through everything between a wish and its wheels:
+  # mission, executive, gate, device. A person starts each course; the wheels are armed for this
+  # course alone. Any input meanwhile is an emergency stop, which holds until the person types
+  # `reset`.
   alias Console.Calibrate.StdinPrompt
   alias Console.Cli.{Format, Output}
   alias Hal.Pose

@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.Odometry do
-  @moduledoc """
-  Runs `mix calibrate odometry`: lets a robot drive courses, asks for tape measurements, estimates the errors of its
-  odometry, and writes the corrections into the robot's file.
-  """
+  @moduledoc false
+  # Runs `mix calibrate odometry`: lets a robot drive courses, asks for tape measurements, estimates the errors of its
+  # odometry, and writes the corrections into the robot's file.
   alias Console.Calibrate.{
     Live,
     Options,

@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.RobotFile do
-  @moduledoc """
-  Writes the result into a robot file. It shows the change before it writes, and changes nothing
-  but these numbers.
-  """
+  @moduledoc false
+  # Writes the result into a robot file. It shows the change before it writes, and changes nothing
+  # but these numbers.
   alias Console.Calibrate.StdinPrompt
   alias Console.Cli.{Diff, OutFile}
   alias Swarm.MemberSpec

@@ -1,7 +1,6 @@
 defmodule Console.Calibrate.Simulated do
-  @moduledoc """
-  Calibrates simulated robots, and compares the result with the true errors of their wheels.
-  """
+  @moduledoc false
+  # Calibrates simulated robots, and compares the result with the true errors of their wheels.
   alias Console.Calibrate.Report
   alias Console.Cli.{Format, Output, Progress}
   alias Robot.Calibration

@@ -1,8 +1,7 @@
 defmodule Console.Calibrate.StdinPrompt do
-  @moduledoc """
-  Asks a person, and reads what is typed while a robot drives. One process reads standard input,
-  line by line, so that no line is lost to an abandoned question.
-  """
+  @moduledoc false
+  # Asks a person, and reads what is typed while a robot drives. One process reads standard input,
+  # line by line, so that no line is lost to an abandoned question.
 
   @enforce_keys [:reader, :ref]
   defstruct @enforce_keys

@@ -1,10 +1,9 @@
 defmodule Console.Page.Changes do
-  @moduledoc """
-  Records what each robot of a fleet did, one line for each change of its state from scene to scene, and what the fleet tells of
-  it. Pure.
-
-  A mesh tells such lines itself (`Console.Live.Mesh.View`).
-  """
+  @moduledoc false
+  # Records what each robot of a fleet did, one line for each change of its state from scene to scene, and what the fleet tells of
+  # it. Pure.
+  #
+  # A mesh tells such lines itself (`Console.Live.Mesh.View`).
   alias Console.Cli.Format
   alias Sim.Scene
 

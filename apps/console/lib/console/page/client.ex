@@ -1,11 +1,10 @@
 defmodule Console.Page.Client do
-  @moduledoc """
-  Carries out what a person types and clicks on the page, one after the other.
-
-  The dead man's switch of a robot that is driven by keyboard is the robot's own: each word of the page is an order to move
-  for 300 ms. Whatever is gone then, the keyboard, the browser, this process, its node or the network, the robot stands.
-  A word that has waited here for longer is not passed on.
-  """
+  @moduledoc false
+  # Carries out what a person types and clicks on the page, one after the other.
+  #
+  # The dead man's switch of a robot that is driven by keyboard is the robot's own: each word of the page is an order to move
+  # for 300 ms. Whatever is gone then, the keyboard, the browser, this process, its node or the network, the robot stands.
+  # A word that has waited here for longer is not passed on.
   use GenServer
   alias Console.Page.{About, Feed, State}
   alias Console.Teleop

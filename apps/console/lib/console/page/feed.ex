@@ -1,10 +1,9 @@
 defmodule Console.Page.Feed do
-  @moduledoc """
-  Asks for the scene ten times a second while somebody looks, and gives it as JSON to those who are ready for it.
-
-  A pusher that is still writing gets the newest scene when it asks again, so that a slow browser sees fewer of them, and
-  nothing queues.
-  """
+  @moduledoc false
+  # Asks for the scene ten times a second while somebody looks, and gives it as JSON to those who are ready for it.
+  #
+  # A pusher that is still writing gets the newest scene when it asks again, so that a slow browser sees fewer of them, and
+  # nothing queues.
   use GenServer
   alias Console.Page.{Changes, State}
 

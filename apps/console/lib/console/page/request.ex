@@ -1,8 +1,7 @@
 defmodule Console.Page.Request do
-  @moduledoc """
-  Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
-  scenes as JSON and says its lines (`Console.Page.Client`). Runs in mochiweb's processes, one a connection.
-  """
+  @moduledoc false
+  # Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
+  # scenes as JSON and says its lines (`Console.Page.Client`). Runs in mochiweb's processes, one a connection.
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
   alias Console.Page

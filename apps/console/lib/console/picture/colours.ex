@@ -1,9 +1,8 @@
 defmodule Console.Picture.Colours do
-  @moduledoc """
-  Chooses the colour and size of each robot in a drawing; the colours are distinguishable for the colour-blind. Pure.
-
-  The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
-  """
+  @moduledoc false
+  # Chooses the colour and size of each robot in a drawing; the colours are distinguishable for the colour-blind. Pure.
+  #
+  # The first seven are Okabe and Ito's; larger fleets repeat them with other dash patterns.
 
   @colours ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5B3A8C"]
   @dashes [nil, "7 3", "2 3", "9 3 2 3", "14 4", "4 2 1 2"]

@@ -1,7 +1,6 @@
 defmodule Console.Picture.Floor do
-  @moduledoc """
-  Draws the upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
-  """
+  @moduledoc false
+  # Draws the upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
   alias Console.Picture.{MapView, RunTrack, Svg}
   alias Console.Picture.{Colours, Labels}
   alias Hal.Pose

@@ -1,7 +1,6 @@
 defmodule Console.Picture.MapView do
-  @moduledoc """
-  Holds a map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
-  """
+  @moduledoc false
+  # Holds a map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
 
   @enforce_keys [:name, :width, :height, :wall?]
   defstruct @enforce_keys

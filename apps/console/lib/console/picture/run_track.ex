@@ -1,9 +1,8 @@
 defmodule Console.Picture.RunTrack do
-  @moduledoc """
-  Collects what a run records for its picture: each robot's path, and the formation error over time. Pure.
-
-  A path gets a new point when its robot has moved by 2 cm, so that long waits cost nothing.
-  """
+  @moduledoc false
+  # Collects what a run records for its picture: each robot's path, and the formation error over time. Pure.
+  #
+  # A path gets a new point when its robot has moved by 2 cm, so that long waits cost nothing.
   alias Hal.Pose
   alias Sim.Scene
 

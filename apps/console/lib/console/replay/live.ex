@@ -1,8 +1,7 @@
 defmodule Console.Replay.Live do
-  @moduledoc """
-  Replays a recording of robots of processes (`Robot.Recorder`) for people: whether they decide
-  the same again, how they were at a time, and why.
-  """
+  @moduledoc false
+  # Replays a recording of robots of processes (`Robot.Recorder`) for people: whether they decide
+  # the same again, how they were at a time, and why.
   alias Robot.Recording
   alias Console.Cli.Output
   alias Console.Replay.{Asked, LiveText, Options}

@@ -1,8 +1,7 @@
 defmodule Console.Replay.Session do
-  @moduledoc """
-  Runs `mix replay FILE --step`: a person goes forwards and backwards in a run, and asks how the fleet stood at each
-  tick, and why. Reads commands (`Console.Replay.Command`) from standard input, a terminal or not, until its end.
-  """
+  @moduledoc false
+  # Runs `mix replay FILE --step`: a person goes forwards and backwards in a run, and asks how the fleet stood at each
+  # tick, and why. Reads commands (`Console.Replay.Command`) from standard input, a terminal or not, until its end.
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Replay.{Command, Difference, Moment, Options}
   alias Sim.{Recording, Replay, Trial}

@@ -1,8 +1,7 @@
 defmodule Console.Scenario.Options do
-  @moduledoc """
-  Reads the arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded (`nil`:
-  nowhere). Pure.
-  """
+  @moduledoc false
+  # Reads the arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded (`nil`:
+  # nowhere). Pure.
   alias Console.Cli.{Arguments, Parse}
 
   @enforce_keys [:files]

@@ -1,8 +1,7 @@
 defmodule Console.Scenario.Session do
-  @moduledoc """
-  Runs the files of `mix scenario`: one with its stages as they happen, several side by side, each
-  printed as a whole in the order of the arguments.
-  """
+  @moduledoc false
+  # Runs the files of `mix scenario`: one with its stages as they happen, several side by side, each
+  # printed as a whole in the order of the arguments.
   alias Console.Cli.{Format, Output}
   alias Console.Scenario.{Options, Recording, Report}
   alias Sim.{Scenario, Trial}

@@ -1,10 +1,9 @@
 defmodule Console.Teleop.Gamepad do
-  @moduledoc """
-  Drives a robot by a gamepad: ten words a second while a shoulder button is held (`Console.Teleop.Joystick`), one word to stand
-  when it is let go or the gamepad is gone.
-
-  Debian's `cat` reads the device, so that no thread of the VM waits in it.
-  """
+  @moduledoc false
+  # Drives a robot by a gamepad: ten words a second while a shoulder button is held (`Console.Teleop.Joystick`), one word to stand
+  # when it is let go or the gamepad is gone.
+  #
+  # Debian's `cat` reads the device, so that no thread of the VM waits in it.
   use GenServer, restart: :temporary
   alias Console.Teleop
   alias Console.Teleop.Joystick

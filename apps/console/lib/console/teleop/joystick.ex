@@ -1,13 +1,12 @@
 defmodule Console.Teleop.Joystick do
-  @moduledoc """
-  Reads a gamepad as Linux tells of it (`/dev/input/js0`): events of eight bytes, little-endian: the time in ms (32
-  bits), the value (signed, 16 bits), the type (8 bits: 1 a button, 2 an axis, with 128 added for how things were when
-  it was opened), and the number of button or axis (8 bits). Pure. Source: Linux's joystick API,
-  `Documentation/input/joydev/joystick-api.rst`.
-
-  A robot is driven only while a shoulder button (4 or 5) is held: that is the dead man's switch of a gamepad. The left stick
-  (axes 0 and 1) says where to; what is within a tenth of its middle is the middle.
-  """
+  @moduledoc false
+  # Reads a gamepad as Linux tells of it (`/dev/input/js0`): events of eight bytes, little-endian: the time in ms (32
+  # bits), the value (signed, 16 bits), the type (8 bits: 1 a button, 2 an axis, with 128 added for how things were when
+  # it was opened), and the number of button or axis (8 bits). Pure. Source: Linux's joystick API,
+  # `Documentation/input/joydev/joystick-api.rst`.
+  #
+  # A robot is driven only while a shoulder button (4 or 5) is held: that is the dead man's switch of a gamepad. The left stick
+  # (axes 0 and 1) says where to; what is within a tenth of its middle is the middle.
   import Bitwise, only: [band: 2]
 
   @dead_zone 0.1

@@ -1,11 +1,10 @@
 defmodule Console.Terminal.Canvas do
-  @moduledoc """
-  Draws the map in characters: walls in half blocks, robots as arrows with their names. Pure.
-
-  A character is assumed to be twice as high as wide, so that a circle on the floor is a circle on
-  the screen. Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into
-  colours.
-  """
+  @moduledoc false
+  # Draws the map in characters: walls in half blocks, robots as arrows with their names. Pure.
+  #
+  # A character is assumed to be twice as high as wide, so that a circle on the floor is a circle on
+  # the screen. Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into
+  # colours.
   alias Console.Picture.MapView
   alias Hal.Pose
 

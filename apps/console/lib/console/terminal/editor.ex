@@ -1,10 +1,9 @@
 defmodule Console.Terminal.Editor do
-  @moduledoc """
-  Edits a line, key by key: moving, deleting, history, completion. Pure.
-
-  The view draws it, so the terminal itself must not echo. A line ends at `:most` bytes and a
-  character beyond them, so that whoever reads it sees that it was longer; the rest is dropped.
-  """
+  @moduledoc false
+  # Edits a line, key by key: moving, deleting, history, completion. Pure.
+  #
+  # The view draws it, so the terminal itself must not echo. A line ends at `:most` bytes and a
+  # character beyond them, so that whoever reads it sees that it was longer; the rest is dropped.
 
   defstruct before: "",
             behind: "",

@@ -1,11 +1,10 @@
 defmodule Console.Terminal.Session do
-  @moduledoc """
-  Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
-
-  One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
-  decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Live`
-  acts.
-  """
+  @moduledoc false
+  # Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
+  #
+  # One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
+  # decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Live`
+  # acts.
   alias Console.{Demo, Options, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack

@@ -1,9 +1,8 @@
 defmodule Console.Terminal.Tty do
-  @moduledoc """
-  Puts the terminal into raw mode: single keys instead of lines, and its settings restored at the end.
-
-  Ctrl-C comes as a key too: it must not stop the program while the terminal is changed.
-  """
+  @moduledoc false
+  # Puts the terminal into raw mode: single keys instead of lines, and its settings restored at the end.
+  #
+  # Ctrl-C comes as a key too: it must not stop the program while the terminal is changed.
 
   @raw ~w(-icanon -echo -isig -ixon min 1 time 0)
 

@@ -1,7 +1,6 @@
 defmodule Hal.Camera.Options do
-  @moduledoc """
-  Checks the options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
-  """
+  @moduledoc false
+  # Checks the options of `Hal.Camera.FFmpeg`, where they are listed. Pure.
   alias Hal.Camera.Source
   alias Hal.Options
 

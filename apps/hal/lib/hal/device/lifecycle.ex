@@ -1,8 +1,7 @@
 defmodule Hal.Device.Lifecycle do
-  @moduledoc """
-  Describes what a device does with its driver: opens it, reopens it after a failure, judges its signs of
-  life, arms and drives the wheels. Runs in the device's process.
-  """
+  @moduledoc false
+  # Describes what a device does with its driver: opens it, reopens it after a failure, judges its signs of
+  # life, arms and drives the wheels. Runs in the device's process.
   alias Hal.Twist
   alias Hal.Device.Arming
   alias Hal.Device.{Confirmation, Liveness, Obedience, Publisher, State, Watchdog}

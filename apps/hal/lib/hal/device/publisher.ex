@@ -1,8 +1,7 @@
 defmodule Hal.Device.Publisher do
-  @moduledoc """
-  Publishes what a device reports: its readings to its sinks, and each change of its health and
-  arming, once, to sinks and events. Makes no decisions.
-  """
+  @moduledoc false
+  # Publishes what a device reports: its readings to its sinks, and each change of its health and
+  # arming, once, to sinks and events. Makes no decisions.
   alias Hal.Event
   alias Hal.Device.Arming
   alias Hal.Device.{Obedience, State, Words}

@@ -1,8 +1,7 @@
 defmodule Hal.Device.Requests do
-  @moduledoc """
-  Gives a driver the requests other than speeds: the direction and zoom of a pan-tilt unit, and a
-  camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
-  """
+  @moduledoc false
+  # Gives a driver the requests other than speeds: the direction and zoom of a pan-tilt unit, and a
+  # camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
   alias Hal.Device.{Lifecycle, Obedience, State}
 
   @doc "Keeps a request, and passes it to the driver if that is open and has this callback."

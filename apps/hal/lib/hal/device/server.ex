@@ -1,8 +1,7 @@
 defmodule Hal.Device.Server do
-  @moduledoc """
-  Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
-  which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
-  """
+  @moduledoc false
+  # Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
+  # which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
   use Hal.HardenedServer
   alias Hal.Device.{Confirmation, Lifecycle, Publisher, Requests, State}
   alias Hal.{HardenedServer, Twist}

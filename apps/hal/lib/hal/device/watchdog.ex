@@ -1,8 +1,7 @@
 defmodule Hal.Device.Watchdog do
-  @moduledoc """
-  Stops wheels that have received no further speed for 500 ms: the second line of defence behind the gate. Its message
-  `{:watchdog, ref}` counts only while `ref` is the one in the state.
-  """
+  @moduledoc false
+  # Stops wheels that have received no further speed for 500 ms: the second line of defence behind the gate. Its message
+  # `{:watchdog, ref}` counts only while `ref` is the one in the state.
   alias Hal.Device.State
   alias Hal.Twist
 

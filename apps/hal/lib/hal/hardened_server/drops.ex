@@ -1,10 +1,9 @@
 defmodule Hal.HardenedServer.Drops do
-  @moduledoc """
-  Counts what the process of a `Hal.HardenedServer` drops, and reports it at most once a minute.
-
-  Both the loop and the module's callbacks drop messages, and know nothing of each other's state:
-  so the count is in the process dictionary.
-  """
+  @moduledoc false
+  # Counts what the process of a `Hal.HardenedServer` drops, and reports it at most once a minute.
+  #
+  # Both the loop and the module's callbacks drop messages, and know nothing of each other's state:
+  # so the count is in the process dictionary.
   alias Hal.Event
 
   @every_ms 60_000

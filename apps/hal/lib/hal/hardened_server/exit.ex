@@ -1,8 +1,7 @@
 defmodule Hal.HardenedServer.Exit do
-  @moduledoc """
-  Describes how the process of a `Hal.HardenedServer` ends: it calls the module's `terminate/2`, reports the
-  reason as `GenServer` does, unless it is an ordinary one, and exits with it.
-  """
+  @moduledoc false
+  # Describes how the process of a `Hal.HardenedServer` ends: it calls the module's `terminate/2`, reports the
+  # reason as `GenServer` does, unless it is an ordinary one, and exits with it.
 
   @typep process :: %{name: term(), module: module(), state: term()}
 

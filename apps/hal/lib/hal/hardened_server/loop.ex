@@ -1,8 +1,7 @@
 defmodule Hal.HardenedServer.Loop do
-  @moduledoc """
-  Runs the loop of a `Hal.HardenedServer`: receives, sorts out what no callback may see, calls the module and does what
-  it answers. A process as OTP's `sys` and `proc_lib` describe special processes.
-  """
+  @moduledoc false
+  # Runs the loop of a `Hal.HardenedServer`: receives, sorts out what no callback may see, calls the module and does what
+  # it answers. A process as OTP's `sys` and `proc_lib` describe special processes.
   alias Hal.HardenedServer.{Drops, Exit}
 
   @requests [:suspend, :resume, :get_state, :get_status]

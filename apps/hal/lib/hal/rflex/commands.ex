@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Commands do
-  @moduledoc """
-  Sequences of commands that a driver sends together: speeds, stops, initialisation and last
-  words. Pure.
-  """
+  @moduledoc false
+  # Sequences of commands that a driver sends together: speeds, stops, initialisation and last
+  # words. Pure.
   alias Hal.Twist
   alias Hal.RFlex.Options
   alias Hal.RFlex.Protocol.{Command, Queue}

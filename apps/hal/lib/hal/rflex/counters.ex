@@ -1,7 +1,6 @@
 defmodule Hal.RFlex.Counters do
-  @moduledoc """
-  Counts what went wrong on a driver's line since it was opened, and reports it.
-  """
+  @moduledoc false
+  # Counts what went wrong on a driver's line since it was opened, and reports it.
   alias Hal.Event
   alias Hal.RFlex.{Driver, Options, Readings, Schedule}
 

@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Options do
-  @moduledoc """
-  Checks the options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that follow from the
-  body (`Hal.RFlex.Sensors.Layout`). Pure.
-  """
+  @moduledoc false
+  # Checks the options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that follow from the
+  # body (`Hal.RFlex.Sensors.Layout`). Pure.
   alias Hal.{Options, Profile, Serial}
   alias Hal.Drive.SlewLimiter
   alias Hal.RFlex.Conversions

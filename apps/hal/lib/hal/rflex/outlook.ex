@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Outlook do
-  @moduledoc """
-  Judges a base by its options alone, before its line is opened: whether it may be armed, what it
-  reads, and which allowed values are unusual. The driver and `mix robot.check` use it. Pure.
-  """
+  @moduledoc false
+  # Judges a base by its options alone, before its line is opened: whether it may be armed, what it
+  # reads, and which allowed values are unusual. The driver and `mix robot.check` use it. Pure.
   alias Hal.RFlex.{Commands, Conversions, Options}
 
   @baud 115_200

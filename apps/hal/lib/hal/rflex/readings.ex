@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Readings do
-  @moduledoc """
-  Converts the controller's packets to readings in our units. Pure; the time of arrival is passed
-  in, as integer milliseconds.
-  """
+  @moduledoc false
+  # Converts the controller's packets to readings in our units. Pure; the time of arrival is passed
+  # in, as integer milliseconds.
   alias Hal.RFlex.Options
   alias Hal.RFlex.Protocol.{Packet, Report}
   alias Hal.RFlex.Sensors.{Bumpers, IndexSwitch, Infrared, Odometry, Sonar}

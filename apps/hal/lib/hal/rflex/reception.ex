@@ -1,7 +1,6 @@
 defmodule Hal.RFlex.Reception do
-  @moduledoc """
-  Turns bytes from a driver's line into readings. Time is passed in, in milliseconds.
-  """
+  @moduledoc false
+  # Turns bytes from a driver's line into readings. Time is passed in, in milliseconds.
   alias Hal.RFlex.{Driver, Readings}
   alias Hal.RFlex.Protocol.Decoder
 

@@ -1,7 +1,6 @@
 defmodule Hal.RFlex.Schedule do
-  @moduledoc """
-  Decides when a driver does its periodic tasks next: `due` has the times, in milliseconds. Pure.
-  """
+  @moduledoc false
+  # Decides when a driver does its periodic tasks next: `due` has the times, in milliseconds. Pure.
   alias Hal.RFlex.Driver
 
   @doc "Whether a task is due; one that was never scheduled is."

@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Speeds do
-  @moduledoc """
-  Sends speeds to the wheels for a driver: the requested speed, limited (`Hal.Drive.SlewLimiter`), repeated, and after a
-  release of the brake. Pure; time is passed in, in milliseconds.
-  """
+  @moduledoc false
+  # Sends speeds to the wheels for a driver: the requested speed, limited (`Hal.Drive.SlewLimiter`), repeated, and after a
+  # release of the brake. Pure; time is passed in, in milliseconds.
   alias Hal.Drive.SlewLimiter
   alias Hal.RFlex.{Commands, Driver, Schedule}
   alias Hal.RFlex.Protocol.{Command, Queue}

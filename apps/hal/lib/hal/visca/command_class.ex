@@ -1,12 +1,11 @@
 defmodule Hal.Visca.CommandClass do
-  @moduledoc """
-  Classes of commands to a camera that replace each other: at most one of each class waits. Pure.
-
-  A newer target for the head makes an older one pointless; the same holds for zoom, power and
-  each inquiry. The number of waiting commands is therefore bounded by the number of classes,
-  however fast commands come and however slow the camera is. Relative steps have a class of their
-  own, in which they add up.
-  """
+  @moduledoc false
+  # Classes of commands to a camera that replace each other: at most one of each class waits. Pure.
+  #
+  # A newer target for the head makes an older one pointless; the same holds for zoom, power and
+  # each inquiry. The number of waiting commands is therefore bounded by the number of classes,
+  # however fast commands come and however slow the camera is. Relative steps have a class of their
+  # own, in which they add up.
   alias Hal.Visca.Command
 
   @type t :: atom() | {atom(), term()}

@@ -1,13 +1,12 @@
 defmodule Hal.Visca.Decoder do
-  @moduledoc """
-  Splits the bytes of the line into replies, however they arrive (fact sheet, section 2). Pure.
-
-  A message ends with 0xFF, which does not occur inside one; so after any damage the next message
-  is whole again. Bytes before the first header from which the rest is a reply are garbage: noise,
-  or the beginning of a message that lost its end. All bytes are accounted for: in a reply, in
-  `garbage`, in a reply of another camera of the chain (`others` counts these), or kept because
-  their 0xFF has not come. At most 15 bytes are kept, because no message is longer than 16.
-  """
+  @moduledoc false
+  # Splits the bytes of the line into replies, however they arrive (fact sheet, section 2). Pure.
+  #
+  # A message ends with 0xFF, which does not occur inside one; so after any damage the next message
+  # is whole again. Bytes before the first header from which the rest is a reply are garbage: noise,
+  # or the beginning of a message that lost its end. All bytes are accounted for: in a reply, in
+  # `garbage`, in a reply of another camera of the chain (`others` counts these), or kept because
+  # their 0xFF has not come. At most 15 bytes are kept, because no message is longer than 16.
   alias Hal.Visca.Reply
 
   @longest 15

@@ -1,8 +1,7 @@
 defmodule Mcap.FileWriter.Output do
-  @moduledoc """
-  Writes to a file; or, with a limit, to a folder of numbered files. All functions return the error as one line; the
-  file then ends with the last chunk that was written whole, finished if that is still possible.
-  """
+  @moduledoc false
+  # Writes to a file; or, with a limit, to a folder of numbered files. All functions return the error as one line; the
+  # file then ends with the last chunk that was written whole, finished if that is still possible.
   alias Mcap.FileWriter.{Disk, Folder}
   alias Mcap.Writer
 

@@ -1,8 +1,7 @@
 defmodule Mcap.Foxglove.Schemas do
-  @moduledoc """
-  Lists the JSON schemas of the messages that `Mcap.Foxglove` makes. Viewers choose the panel by the name. Within what
-  their parser understands: each field has one type, objects list their properties, and there are no references.
-  """
+  @moduledoc false
+  # Lists the JSON schemas of the messages that `Mcap.Foxglove` makes. Viewers choose the panel by the name. Within what
+  # their parser understands: each field has one type, objects list their properties, and there are no references.
 
   # `[…]` is an array, `{:object, …}` an object with its fields in order; `{:choice, …}` a number by name.
   v2 = {:object, x: :number, y: :number}

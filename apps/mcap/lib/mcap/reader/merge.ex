@@ -1,8 +1,7 @@
 defmodule Mcap.Reader.Merge do
-  @moduledoc """
-  Reads the messages of a file in order of time, a chunk when its turn has come. As many chunks are in memory as overlap
-  in time: one, in a file that was written in order.
-  """
+  @moduledoc false
+  # Reads the messages of a file in order of time, a chunk when its turn has come. As many chunks are in memory as overlap
+  # in time: one, in a file that was written in order.
   alias Mcap.DamagedError
   alias Mcap.Reader.{Chunk, Source}
 

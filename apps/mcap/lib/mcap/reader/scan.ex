@@ -1,10 +1,9 @@
 defmodule Mcap.Reader.Scan do
-  @moduledoc """
-  Finds the messages of a file record by record, from its begin: for files without a summary, which were cut or are
-  of another writer. It ends at the first record that is not whole. A chunk that is whole, but damaged, is kept as
-  such; at the very end of a file that was cut it is part of the cut: a disk may lose the last bytes of a file that
-  it has made longer.
-  """
+  @moduledoc false
+  # Finds the messages of a file record by record, from its begin: for files without a summary, which were cut or are
+  # of another writer. It ends at the first record that is not whole. A chunk that is whole, but damaged, is kept as
+  # such; at the very end of a file that was cut it is part of the cut: a disk may lose the last bytes of a file that
+  # it has made longer.
   alias Mcap.Reader.{Chunk, Source}
   alias Mcap.Record.Parse
 

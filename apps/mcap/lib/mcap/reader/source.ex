@@ -1,8 +1,7 @@
 defmodule Mcap.Reader.Source do
-  @moduledoc """
-  Reads parts of an open file. A length that the file claims is believed only as far as the file is long, and up to 256
-  MiB.
-  """
+  @moduledoc false
+  # Reads parts of an open file. A length that the file claims is believed only as far as the file is long, and up to 256
+  # MiB.
 
   @most 0x1000_0000
 

@@ -1,8 +1,7 @@
 defmodule Mcap.Record.Parse do
-  @moduledoc """
-  Parses the bytes of an MCAP file into records: the other direction of `Mcap.Record`. Pure, and for bytes of anybody: a
-  length that does not fit is `:error`, and nothing is allocated for it. Bytes behind the known fields are ignored.
-  """
+  @moduledoc false
+  # Parses the bytes of an MCAP file into records: the other direction of `Mcap.Record`. Pure, and for bytes of anybody: a
+  # length that does not fit is `:error`, and nothing is allocated for it. Bytes behind the known fields are ignored.
 
   @doc """
   The first record of some bytes.

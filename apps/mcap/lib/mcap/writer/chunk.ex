@@ -1,9 +1,8 @@
 defmodule Mcap.Writer.Chunk do
-  @moduledoc """
-  Holds the open chunk of a writer: the records of some messages, to be written as one. Pure.
-
-  It holds the schema and the channel of its messages itself, so that a whole chunk can be read alone.
-  """
+  @moduledoc false
+  # Holds the open chunk of a writer: the records of some messages, to be written as one. Pure.
+  #
+  # It holds the schema and the channel of its messages itself, so that a whole chunk can be read alone.
 
   defstruct records: [],
             bytes: 0,

@@ -1,12 +1,11 @@
 defmodule Mesh.Distribution.CallingAddress do
-  @moduledoc """
-  Finds where this node calls others from.
-
-  - A node that listens on one address only, or has an interface, calls from there, since that is where others hear it.
-  - A shell of a release (`-mesh_shell true`, `rel/remote.vm.args.eex`) that root has started calls from a reserved port,
-    one below 1024, which the kernel gives to nobody else: so a robot tells whoever operates it from all other programs
-    of its machine (`Mesh.Distribution.Access`). A shell of another user calls from any port.
-  """
+  @moduledoc false
+  # Finds where this node calls others from.
+  #
+  # - A node that listens on one address only, or has an interface, calls from there, since that is where others hear it.
+  # - A shell of a release (`-mesh_shell true`, `rel/remote.vm.args.eex`) that root has started calls from a reserved port,
+  #   one below 1024, which the kernel gives to nobody else: so a robot tells whoever operates it from all other programs
+  #   of its machine (`Mesh.Distribution.Access`). A shell of another user calls from any port.
   alias Mesh.Interface
 
   # As `rresvport(3)`.

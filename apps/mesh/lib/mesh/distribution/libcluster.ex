@@ -1,9 +1,8 @@
 defmodule Mesh.Distribution.Libcluster do
-  @moduledoc """
-  Runs libcluster's topologies if libcluster is installed: any of its strategies then connects
-  nodes, and connected nodes introduce themselves to each other's mesh. If it crashes, the mesh
-  goes on, and it is started again with back-off.
-  """
+  @moduledoc false
+  # Runs libcluster's topologies if libcluster is installed: any of its strategies then connects
+  # nodes, and connected nodes introduce themselves to each other's mesh. If it crashes, the mesh
+  # goes on, and it is started again with back-off.
   use Hal.HardenedServer
   alias Hal.{Event, HardenedServer}
   alias Mesh.Backoff

@@ -1,13 +1,12 @@
 defmodule Mesh.Distribution.Listener do
-  @moduledoc """
-  Accepts connections of OTP's distribution in the carriers `Mesh.Distribution.Tcp_dist` and `.Tls_dist`: `:inet_tcp`,
-  but that `accept/1` returns only connections that `Mesh.Distribution.Access` lets in. It closes all others at once and
-  accepts the next. Nothing is read from those who are refused, and no other process hears of them. Without TLS,
-  `recv/3` then asks whether the name that opens OTP's handshake may become an atom.
-
-  OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
-  From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
-  """
+  @moduledoc false
+  # Accepts connections of OTP's distribution in the carriers `Mesh.Distribution.Tcp_dist` and `.Tls_dist`: `:inet_tcp`,
+  # but that `accept/1` returns only connections that `Mesh.Distribution.Access` lets in. It closes all others at once and
+  # accepts the next. Nothing is read from those who are refused, and no other process hears of them. Without TLS,
+  # `recv/3` then asks whether the name that opens OTP's handshake may become an atom.
+  #
+  # OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
+  # From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
   alias Mesh.Distribution
   alias Mesh.Distribution.{Epmd, Preload}
   alias Mesh.Distribution.Access.{Networks, Refusals}

@@ -1,9 +1,8 @@
 defmodule Mesh.Distribution.Preload do
-  @moduledoc """
-  Loads what Erlang's distribution runs of this project. It listens before any application starts, and while Mix starts it
-  goes from folder to folder, takes code paths away and puts others there: a node that was dialled meanwhile missed its
-  own modules, and lost its accept loop by that. What is loaded needs no path. Elixir's own modules are always found.
-  """
+  @moduledoc false
+  # Loads what Erlang's distribution runs of this project. It listens before any application starts, and while Mix starts it
+  # goes from folder to folder, takes code paths away and puts others there: a node that was dialled meanwhile missed its
+  # own modules, and lost its accept loop by that. What is loaded needs no path. Elixir's own modules are always found.
 
   @modules [
     Hal.Event,

@@ -1,14 +1,13 @@
 defmodule Mesh.Distribution.Topology do
-  @moduledoc """
-  Chooses the nodes that a node connects its distribution to. Pure: all nodes compute the same from the known nodes.
-
-  Up to `full_mesh` nodes, every node connects to every other. Above that, the names in order form
-  a ring with chords: each node connects to those 1, n^(1/4), n^(1/2) and n^(3/4) places further
-  on, and so to as many before it; with a hundred nodes no two are more than seven steps apart,
-  and each has at most eight connections.
-
-  Of each pair the node whose name comes first dials; the other does so if that has not happened.
-  """
+  @moduledoc false
+  # Chooses the nodes that a node connects its distribution to. Pure: all nodes compute the same from the known nodes.
+  #
+  # Up to `full_mesh` nodes, every node connects to every other. Above that, the names in order form
+  # a ring with chords: each node connects to those 1, n^(1/4), n^(1/2) and n^(3/4) places further
+  # on, and so to as many before it; with a hundred nodes no two are more than seven steps apart,
+  # and each has at most eight connections.
+  #
+  # Of each pair the node whose name comes first dials; the other does so if that has not happened.
 
   @doc """
   The nodes that `me` should be connected to, sorted.

@@ -1,9 +1,8 @@
 defmodule Mesh.Protocol.Beacon do
-  @moduledoc """
-  Describes what a node says about itself: the nodes that it hears and their addresses, the nodes that its
-  distribution is connected to, and the port that the distribution listens on (0: ask epmd). Names
-  are text. Pure.
-  """
+  @moduledoc false
+  # Describes what a node says about itself: the nodes that it hears and their addresses, the nodes that its
+  # distribution is connected to, and the port that the distribution listens on (0: ask epmd). Names
+  # are text. Pure.
 
   alias Mesh.Strategy.Static
   alias Mesh.Protocol.WireTerm

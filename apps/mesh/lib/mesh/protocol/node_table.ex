@@ -1,15 +1,14 @@
 defmodule Mesh.Protocol.NodeTable do
-  @moduledoc """
-  Records what a node knows about the others: their addresses, when they were heard, the nodes that they
-  hear and are connected to, and the robots that they hold. Pure; times are this node's own, in
-  ms.
-
-  The address of a node that others hear, but this one does not, is a lead: it gets beacons, too.
-
-  A node is suspect after 1 s of silence and gone after 2 s; only datagrams decide that, never a
-  connection. A node that is gone stays in the table and is sent beacons for ever. The view's
-  number grows with each node that comes or goes.
-  """
+  @moduledoc false
+  # Records what a node knows about the others: their addresses, when they were heard, the nodes that they
+  # hear and are connected to, and the robots that they hold. Pure; times are this node's own, in
+  # ms.
+  #
+  # The address of a node that others hear, but this one does not, is a lead: it gets beacons, too.
+  #
+  # A node is suspect after 1 s of silence and gone after 2 s; only datagrams decide that, never a
+  # connection. A node that is gone stays in the table and is sent beacons for ever. The view's
+  # number grows with each node that comes or goes.
   alias Mesh.Backoff
 
   @suspect_ms 1_000

@@ -1,8 +1,7 @@
 defmodule Mesh.Protocol.Outbox do
-  @moduledoc """
-  Describes what a node sends: signed datagrams, each with the next number of its session, the time and its
-  own addresses. Pure.
-  """
+  @moduledoc false
+  # Describes what a node sends: signed datagrams, each with the next number of its session, the time and its
+  # own addresses. Pure.
   alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Rejections}
 
   @doc "A beacon for these addresses: who is heard here, and who is connected."

@@ -1,8 +1,7 @@
 defmodule Mesh.Protocol.Rejections do
-  @moduledoc """
-  Counts what a node refuses, by reason, and in each second what nobody of the fleet has sent, by
-  which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
-  """
+  @moduledoc false
+  # Counts what a node refuses, by reason, and in each second what nobody of the fleet has sent, by
+  # which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
   alias Mesh.Protocol.Packet
   alias Mesh.Protocol.Packet.ReplayProtection
 

@@ -1,12 +1,11 @@
 defmodule Mesh.Protocol.Roster do
-  @moduledoc """
-  Lists the names that a node may meet: its fleet's robots and the nodes without a robot, each at this node's own host
-  part. They come from the configuration and are made into atoms once, at the start; what arrives by radio is compared
-  with them as text and never becomes an atom. Pure.
-
-  All nodes of a fleet share the host part of their names, which need not be a machine's name
-  (`mag1@lab`): where a node is, is told by its beacons.
-  """
+  @moduledoc false
+  # Lists the names that a node may meet: its fleet's robots and the nodes without a robot, each at this node's own host
+  # part. They come from the configuration and are made into atoms once, at the start; what arrives by radio is compared
+  # with them as text and never becomes an atom. Pure.
+  #
+  # All nodes of a fleet share the host part of their names, which need not be a machine's name
+  # (`mag1@lab`): where a node is, is told by its beacons.
 
   @enforce_keys [:me, :nodes, :robots]
   defstruct @enforce_keys

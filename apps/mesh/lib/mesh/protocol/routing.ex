@@ -1,8 +1,7 @@
 defmodule Mesh.Protocol.Routing do
-  @moduledoc """
-  Routes commands to robots on nodes that this one does not hear, through nodes that hear both.
-  Pure, computed from the node table.
-  """
+  @moduledoc false
+  # Routes commands to robots on nodes that this one does not hear, through nodes that hear both.
+  # Pure, computed from the node table.
   alias Mesh.Protocol.NodeTable
 
   @doc "The robots on nodes that are not heard here, but are heard by others that are, sorted."

@@ -1,7 +1,6 @@
 defmodule Mesh.Secret.File do
-  @moduledoc """
-  Reads the file of a fleet's secret, only if it is safe, and writes it for its owner alone.
-  """
+  @moduledoc false
+  # Reads the file of a fleet's secret, only if it is safe, and writes it for its owner alone.
   import Bitwise
 
   # The longest text that can be a good secret, including line ends, is far shorter.

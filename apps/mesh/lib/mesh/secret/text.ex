@@ -1,10 +1,9 @@
 defmodule Mesh.Secret.Text do
-  @moduledoc """
-  Judges whether the text of a secret file is good enough to protect a fleet. Pure.
-
-  A good one is base64 or hex text of at least 32 random bytes. Nobody can prove that bytes are
-  random; this finds those that clearly are not: words, rows of keys, patterns, padding.
-  """
+  @moduledoc false
+  # Judges whether the text of a secret file is good enough to protect a fleet. Pure.
+  #
+  # A good one is base64 or hex text of at least 32 random bytes. Nobody can prove that bytes are
+  # random; this finds those that clearly are not: words, rows of keys, patterns, padding.
   import Bitwise
 
   @least 32

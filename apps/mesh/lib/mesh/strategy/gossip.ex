@@ -1,9 +1,8 @@
 defmodule Mesh.Strategy.Gossip do
-  @moduledoc """
-  Sends beacons to a multicast group once a second, for networks that carry multicast. Nothing
-  needs to be configured; many Wi-Fi networks block it (`Mesh.Strategy.Static`). Its option is the
-  group's address and port.
-  """
+  @moduledoc false
+  # Sends beacons to a multicast group once a second, for networks that carry multicast. Nothing
+  # needs to be configured; many Wi-Fi networks block it (`Mesh.Strategy.Static`). Its option is the
+  # group's address and port.
   @behaviour Mesh.Strategy
   alias Hal.Options.Wording
   alias Mesh.Strategy.Static

@@ -1,10 +1,9 @@
 defmodule Mesh.Strategy.Static do
-  @moduledoc """
-  Sends beacons to a list of addresses, for networks that block multicast. Addresses that are not
-  heard are retried for ever, at intervals that grow to 5 s. One address that is up is enough: its
-  beacons report the others. Its option is the list, of `{{10, 0, 0, 7}, 4370}` or
-  `"10.0.0.7:4370"`.
-  """
+  @moduledoc false
+  # Sends beacons to a list of addresses, for networks that block multicast. Addresses that are not
+  # heard are retried for ever, at intervals that grow to 5 s. One address that is up is enough: its
+  # beacons report the others. Its option is the list, of `{{10, 0, 0, 7}, 4370}` or
+  # `"10.0.0.7:4370"`.
   @behaviour Mesh.Strategy
   alias Hal.Options.Wording
   alias Mesh.Backoff

@@ -1,11 +1,10 @@
 defmodule Missions.Flock.Members do
-  @moduledoc """
-  Tracks the members of the flock that a robot hears: who they are, how far they have come, where they tell that they
-  are. Pure.
-
-  Each tells once a second which course it has and its leg. Its pose comes with its heartbeats, 5 times a second, in the
-  peers of the percept; a robot that is there and tells nothing, or has another course, is no member, but an obstacle.
-  """
+  @moduledoc false
+  # Tracks the members of the flock that a robot hears: who they are, how far they have come, where they tell that they
+  # are. Pure.
+  #
+  # Each tells once a second which course it has and its leg. Its pose comes with its heartbeats, 5 times a second, in the
+  # peers of the percept; a robot that is there and tells nothing, or has another course, is no member, but an obstacle.
   alias Hal.{Pose, Twist}
   alias Missions.Flock.Field
   alias Robot.Percept

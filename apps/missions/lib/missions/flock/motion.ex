@@ -1,8 +1,7 @@
 defmodule Missions.Flock.Motion do
-  @moduledoc """
-  Computes the velocity of a robot of the flock, tick by tick, from its percept: the accelerations of
-  `Missions.Flock.Field`, integrated. Pure; metres, m/s, in the frame of the percept's pose.
-  """
+  @moduledoc false
+  # Computes the velocity of a robot of the flock, tick by tick, from its percept: the accelerations of
+  # `Missions.Flock.Field`, integrated. Pure; metres, m/s, in the frame of the percept's pose.
   alias Hal.Pose
   alias Missions.Flock.{Field, Members}
   alias Robot.Behaviour.Avoid.Neighbours

@@ -1,12 +1,11 @@
 defmodule Missions.Landmark.Coverage do
-  @moduledoc """
-  Remembers what the fleet's cameras have looked at, as one robot knows it: cells of 10 cm of the map frame, looked at from
-  places where a robot turned once around. Pure.
-
-  From such a place everything counts as looked at that no wall hides, as far as a camera is sure to find the landmark. Of
-  walls a robot knows its floor plan, or what its sonars see; behind what these do not reach there may be a wall, so
-  without a plan only what is near counts.
-  """
+  @moduledoc false
+  # Remembers what the fleet's cameras have looked at, as one robot knows it: cells of 10 cm of the map frame, looked at from
+  # places where a robot turned once around. Pure.
+  #
+  # From such a place everything counts as looked at that no wall hides, as far as a camera is sure to find the landmark. Of
+  # walls a robot knows its floor plan, or what its sonars see; behind what these do not reach there may be a wall, so
+  # without a plan only what is near counts.
   alias Hal.Pose
   alias Robot.Navigation.{Grid, Survey}
   alias Robot.Navigation.MapFile.Writer

@@ -1,14 +1,13 @@
 defmodule Missions.Landmark.Follower do
-  @moduledoc """
-  Decides what a follower does: it drives to its slot, watches what it can correct its pose by, and passes
-  the reference on to its child. Pure.
-
-  Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
-  Meanwhile it looks at the landmark, because a round may ask next how large it sees it.
-
-  A follower that stands in its slot by its own estimate, but does not know its place well enough
-  to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
-  """
+  @moduledoc false
+  # Decides what a follower does: it drives to its slot, watches what it can correct its pose by, and passes
+  # the reference on to its child. Pure.
+  #
+  # Without a fresh anchor it stands still: that is the leader's lease (1 s since it was heard).
+  # Meanwhile it looks at the landmark, because a round may ask next how large it sees it.
+  #
+  # A follower that stands in its slot by its own estimate, but does not know its place well enough
+  # to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Follower.{Facing, Progress}

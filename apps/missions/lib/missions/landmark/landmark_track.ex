@@ -1,8 +1,7 @@
 defmodule Missions.Landmark.LandmarkTrack do
-  @moduledoc """
-  Tracks what a robot knows about the landmark from its own camera: its apparent size, and its place (map
-  frame). Pure.
-  """
+  @moduledoc false
+  # Tracks what a robot knows about the landmark from its own camera: its apparent size, and its place (map
+  # frame). Pure.
   alias Hal.Pose
   alias Robot.Percept
   alias Robot.Percept.Sighting

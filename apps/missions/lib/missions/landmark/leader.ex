@@ -1,9 +1,8 @@
 defmodule Missions.Landmark.Leader do
-  @moduledoc """
-  Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
-  (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
-  judges whether the shape is formed. Pure.
-  """
+  @moduledoc false
+  # Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
+  # (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
+  # judges whether the shape is formed. Pure.
   alias Robot.Localiser.Anchors
   alias Swarm.Formation
   alias Swarm.Membership.NameSet

@@ -1,13 +1,12 @@
 defmodule Missions.Landmark.Lookout do
-  @moduledoc """
-  Searches from room to room, once a round has ended in which nobody had found the landmark: each robot goes to the
-  nearest place from which it sees what nobody has looked at, turns around there, and so on until the landmark is found or
-  nothing is left. Pure.
-
-  Places are frontiers (`Robot.Navigation.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
-  each other where they have turned and where they go, so that they go apart. A robot that knows nothing of walls has no
-  lookout: it wanders. `Missions.Landmark.Lookout.Legs` chooses among the places.
-  """
+  @moduledoc false
+  # Searches from room to room, once a round has ended in which nobody had found the landmark: each robot goes to the
+  # nearest place from which it sees what nobody has looked at, turns around there, and so on until the landmark is found or
+  # nothing is left. Pure.
+  #
+  # Places are frontiers (`Robot.Navigation.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
+  # each other where they have turned and where they go, so that they go apart. A robot that knows nothing of walls has no
+  # lookout: it wanders. `Missions.Landmark.Lookout.Legs` chooses among the places.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Coverage

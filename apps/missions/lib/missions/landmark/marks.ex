@@ -1,13 +1,12 @@
 defmodule Missions.Landmark.Marks do
-  @moduledoc """
-  Decides what a follower corrects its pose by: the leader's frame, the landmark at the place that the
-  leader reports, and the robots ahead of it in the order at their reported places, each with its
-  reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
-
-  Only robots ahead in the order count, so that corrections run one way, from the leader down. Others
-  may be seen, too, and must not be mistaken for one of these. In a fleet of more than twenty-one only the leader and the
-  nearest are looked for: twenty of all, and twenty of those ahead.
-  """
+  @moduledoc false
+  # Decides what a follower corrects its pose by: the leader's frame, the landmark at the place that the
+  # leader reports, and the robots ahead of it in the order at their reported places, each with its
+  # reported uncertainty. Also decides when the pose is sure enough to claim a slot. Pure.
+  #
+  # Only robots ahead in the order count, so that corrections run one way, from the leader down. Others
+  # may be seen, too, and must not be mistaken for one of these. In a fleet of more than twenty-one only the leader and the
+  # nearest are looked for: twenty of all, and twenty of those ahead.
   alias Hal.Pose
   alias Robot.Localiser.Anchors
   alias Missions.Landmark

@@ -1,13 +1,12 @@
 defmodule Missions.Landmark.Merge do
-  @moduledoc """
-  Decides which leader stays when two meet, for example after a network partition. Pure.
-
-  They hold one round, for an epoch after both, in which each reports how many robots it leads; its
-  record makes the leader of the largest part lead all (`Swarm.Agreement.Election`). The one that will
-  probably win opens the round, once it has had time to hear of everybody; if it does not, the other
-  opens it a little later. A leader whom nobody follows joins a later one without a round. Meanwhile
-  nobody takes the other's followers into its order.
-  """
+  @moduledoc false
+  # Decides which leader stays when two meet, for example after a network partition. Pure.
+  #
+  # They hold one round, for an epoch after both, in which each reports how many robots it leads; its
+  # record makes the leader of the largest part lead all (`Swarm.Agreement.Election`). The one that will
+  # probably win opens the round, once it has had time to hear of everybody; if it does not, the other
+  # opens it a little later. A leader whom nobody follows joins a later one without a round. Meanwhile
+  # nobody takes the other's followers into its order.
   alias Missions.Landmark
   alias Missions.Landmark.Claim
 

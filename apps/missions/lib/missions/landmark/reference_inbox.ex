@@ -1,7 +1,6 @@
 defmodule Missions.Landmark.ReferenceInbox do
-  @moduledoc """
-  Decides whose reference a robot accepts, and when it joins a leader that lists it. Pure.
-  """
+  @moduledoc false
+  # Decides whose reference a robot accepts, and when it joins a leader that lists it. Pure.
   alias Swarm.Agreement.Round
   alias Missions.Landmark.Reference
   alias Missions.Landmark

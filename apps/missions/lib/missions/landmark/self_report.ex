@@ -1,7 +1,6 @@
 defmodule Missions.Landmark.SelfReport do
-  @moduledoc """
-  Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
-  """
+  @moduledoc false
+  # Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, Lookout, Marks}
 

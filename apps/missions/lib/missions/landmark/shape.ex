@@ -1,18 +1,17 @@
 defmodule Missions.Landmark.Shape do
-  @moduledoc """
-  Chooses for the leader a shape that fits the free space. Pure.
-
-  The shape is the requested one as long as that is possible. Slots that a dead robot's body
-  occupies are left out. When followers report that their slots are blocked, and all others stand
-  in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
-  leader's trail, then a cluster round it. When half of them are blocked, at least three, the cluster
-  follows at once. In a cluster, places that a follower could not get to are left out of the next one. Once the
-  leader has moved on, or a person asks for a shape, the requested shape is tried again.
-
-  A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
-  each time that followers cannot get in. While it drives, it keeps the requested shape where that fits, and is followed in a
-  column along its trail where it does not.
-  """
+  @moduledoc false
+  # Chooses for the leader a shape that fits the free space. Pure.
+  #
+  # The shape is the requested one as long as that is possible. Slots that a dead robot's body
+  # occupies are left out. When followers report that their slots are blocked, and all others stand
+  # in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
+  # leader's trail, then a cluster round it. When half of them are blocked, at least three, the cluster
+  # follows at once. In a cluster, places that a follower could not get to are left out of the next one. Once the
+  # leader has moved on, or a person asks for a shape, the requested shape is tried again.
+  #
+  # A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
+  # each time that followers cannot get in. While it drives, it keeps the requested shape where that fits, and is followed in a
+  # column along its trail where it does not.
   alias Hal.Pose
   alias Swarm.Formation
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}

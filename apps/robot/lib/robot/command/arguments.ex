@@ -1,8 +1,7 @@
 defmodule Robot.Command.Arguments do
-  @moduledoc """
-  Parses the arguments of commands: numbers, names of robots and colours. Pure; never creates
-  atoms from its input.
-  """
+  @moduledoc false
+  # Parses the arguments of commands: numbers, names of robots and colours. Pure; never creates
+  # atoms from its input.
 
   # No place, speed or size of a robot is greater than this.
   @greatest 1.0e6

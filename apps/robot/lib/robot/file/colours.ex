@@ -1,8 +1,7 @@
 defmodule Robot.File.Colours do
-  @moduledoc """
-  Reads the colours of a robot file: the path of a CMVision colour file, or a list of keys with that path and the
-  options of `Vision.Colours`.
-  """
+  @moduledoc false
+  # Reads the colours of a robot file: the path of a CMVision colour file, or a list of keys with that path and the
+  # options of `Vision.Colours`.
   alias Hal.Options.Type
 
   @keys {

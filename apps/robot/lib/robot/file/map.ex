@@ -1,8 +1,7 @@
 defmodule Robot.File.Map do
-  @moduledoc """
-  Reads the map of a robot file: the path of a description as map_server writes it, which is relative to the robot
-  file's folder (`Robot.Navigation.MapFile`).
-  """
+  @moduledoc false
+  # Reads the map of a robot file: the path of a description as map_server writes it, which is relative to the robot
+  # file's folder (`Robot.Navigation.MapFile`).
   alias Hal.Options.Type
   alias Hal.Pose
   alias Robot.Navigation.{Grid, MapFile}

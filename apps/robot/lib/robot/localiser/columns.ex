@@ -1,9 +1,8 @@
 defmodule Robot.Localiser.Columns do
-  @moduledoc """
-  Reckons with sets of columns of a camera picture, which is divided into 59 columns of equal width. Pure.
-
-  A set is an integer, one bit for each column; bit 0 is the leftmost.
-  """
+  @moduledoc false
+  # Reckons with sets of columns of a camera picture, which is divided into 59 columns of equal width. Pure.
+  #
+  # A set is an integer, one bit for each column; bit 0 is the leftmost.
   # A robot that is unsure tries thousands of spans a tick. Up to OTP 25, `max` and `min` are calls; comparisons are not.
   import Bitwise
   alias Hal.Pose

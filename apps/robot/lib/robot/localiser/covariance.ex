@@ -1,10 +1,9 @@
 defmodule Robot.Localiser.Covariance do
-  @moduledoc """
-  Defines a covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
-  it. Pure.
-
-  A belief has at most 20 states, for which lists are fast enough.
-  """
+  @moduledoc false
+  # Defines a covariance matrix as a list of its rows, and the operations of an extended Kalman filter on
+  # it. Pure.
+  #
+  # A belief has at most 20 states, for which lists are fast enough.
 
   @type t :: [[float()]]
 

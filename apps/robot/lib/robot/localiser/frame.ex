@@ -1,8 +1,7 @@
 defmodule Robot.Localiser.Frame do
-  @moduledoc """
-  Transforms a belief into the frame of another robot, whose own pose may be uncertain or drift.
-  Pure.
-  """
+  @moduledoc false
+  # Transforms a belief into the frame of another robot, whose own pose may be uncertain or drift.
+  # Pure.
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Covariance}
 

@@ -1,7 +1,6 @@
 defmodule Robot.Localiser.History do
-  @moduledoc """
-  Keeps the poses of odometry at the last ticks, for pictures that were taken a moment ago. Pure.
-  """
+  @moduledoc false
+  # Keeps the poses of odometry at the last ticks, for pictures that were taken a moment ago. Pure.
   alias Hal.Pose
 
   @most 12

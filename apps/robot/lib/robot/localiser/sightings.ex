@@ -1,13 +1,12 @@
 defmodule Robot.Localiser.Sightings do
-  @moduledoc """
-  Corrects a robot's belief with one picture, by the visible objects whose places it was given.
-  Pure.
-
-  Each object gives a direction and, if nothing seems to hide a part of it, a distance: the
-  landmark by its size, a robot by its width. The landmark comes first, because a corrected
-  heading helps to decide which robot is which (`Robot.Localiser.Matching`). Finally the whole
-  picture is compared with the result (`Robot.Localiser.Consistency`).
-  """
+  @moduledoc false
+  # Corrects a robot's belief with one picture, by the visible objects whose places it was given.
+  # Pure.
+  #
+  # Each object gives a direction and, if nothing seems to hide a part of it, a distance: the
+  # landmark by its size, a robot by its width. The landmark comes first, because a corrected
+  # heading helps to decide which robot is which (`Robot.Localiser.Matching`). Finally the whole
+  # picture is compared with the result (`Robot.Localiser.Consistency`).
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Consistency, InSight, Matching, Silhouettes}
   alias Robot.Localiser.Belief.Marks

@@ -1,11 +1,10 @@
 defmodule Robot.Navigation.PathPlanner do
-  @moduledoc """
-  Plans a short path around standing discs. Pure; metres.
-
-  A lazy visibility search: it first tries the straight line to the goal, and considers a disc
-  only if that disc blocks a line. The rim of a disc is approximated by a polygon. So a free path
-  costs one test, and further tests are needed only for the discs in between.
-  """
+  @moduledoc false
+  # Plans a short path around standing discs. Pure; metres.
+  #
+  # A lazy visibility search: it first tries the straight line to the goal, and considers a disc
+  # only if that disc blocks a line. The rim of a disc is approximated by a polygon. So a free path
+  # costs one test, and further tests are needed only for the discs in between.
 
   @type point :: {x :: float(), y :: float()}
   @type disc :: {x :: float(), y :: float(), radius :: float()}

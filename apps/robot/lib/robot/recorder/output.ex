@@ -1,8 +1,7 @@
 defmodule Robot.Recorder.Output do
-  @moduledoc """
-  Writes a recorder's file with its channels: what is written of the entries of a second. The errors are those of
-  `Mcap.FileWriter`, one line each.
-  """
+  @moduledoc false
+  # Writes a recorder's file with its channels: what is written of the entries of a second. The errors are those of
+  # `Mcap.FileWriter`, one line each.
   alias Mcap.FileWriter
   alias Robot.{Recording, Replay}
   alias Robot.Recording.Topics

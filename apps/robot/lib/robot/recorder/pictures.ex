@@ -1,12 +1,11 @@
 defmodule Robot.Recorder.Pictures do
-  @moduledoc """
-  Takes pictures of robots' cameras for their recorder, some a second: a viewer of each robot's
-  `Vision.View`. No process of a robot waits for it, and it asks for a robot's next picture only when
-  the recorder has taken the last one, so that at most one of each robot is under way.
-
-  A robot that has no camera, or none yet, is asked again after a second. It belongs to the recorder,
-  which starts it and to which it sends `{:picture, robot, %Vision.View.Picture{}}`.
-  """
+  @moduledoc false
+  # Takes pictures of robots' cameras for their recorder, some a second: a viewer of each robot's
+  # `Vision.View`. No process of a robot waits for it, and it asks for a robot's next picture only when
+  # the recorder has taken the last one, so that at most one of each robot is under way.
+  #
+  # A robot that has no camera, or none yet, is asked again after a second. It belongs to the recorder,
+  # which starts it and to which it sends `{:picture, robot, %Vision.View.Picture{}}`.
   use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Robot.Names

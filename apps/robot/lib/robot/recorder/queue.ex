@@ -1,11 +1,10 @@
 defmodule Robot.Recorder.Queue do
-  @moduledoc """
-  Passes a robot's entries to its recorder: messages, of which only so many may be under way. Above that they are
-  counted instead of sent, so that a recorder whose disk is slow costs a robot neither time nor memory.
-
-  Each role has its own counters, which only its own process and the recorder write: what a role
-  lost is told before its next entry.
-  """
+  @moduledoc false
+  # Passes a robot's entries to its recorder: messages, of which only so many may be under way. Above that they are
+  # counted instead of sent, so that a recorder whose disk is slow costs a robot neither time nor memory.
+  #
+  # Each role has its own counters, which only its own process and the recorder write: what a role
+  # lost is told before its next entry.
   alias Robot.Trace
 
   @enforce_keys [:counters, :bound]

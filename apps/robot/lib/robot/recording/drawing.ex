@@ -1,8 +1,7 @@
 defmodule Robot.Recording.Drawing do
-  @moduledoc """
-  Draws what a robot knows, for Foxglove and other viewers of its schemas: where it believes itself
-  to be, what others told it, what it sees, where it is going. Nothing here is known to be true. Pure.
-  """
+  @moduledoc false
+  # Draws what a robot knows, for Foxglove and other viewers of its schemas: where it believes itself
+  # to be, what others told it, what it sees, where it is going. Nothing here is known to be true. Pure.
   alias Hal.Pose
   alias Mcap.Foxglove
   alias Mcap.Foxglove.Scene

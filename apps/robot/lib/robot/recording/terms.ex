@@ -1,13 +1,12 @@
 defmodule Robot.Recording.Terms do
-  @moduledoc """
-  Terms of a robot in a form that another VM can read. Pure.
-
-  A reference or a process belongs to its node, and its bytes name that node by an atom, which a
-  reader would not know. Here it is a text; read again, it is one of the reader's node, with the
-  same text. Those of one robot stay different from each other, and equal ones stay equal.
-
-  A profile is written once for the robot, not in each percept.
-  """
+  @moduledoc false
+  # Terms of a robot in a form that another VM can read. Pure.
+  #
+  # A reference or a process belongs to its node, and its bytes name that node by an atom, which a
+  # reader would not know. Here it is a text; read again, it is one of the reader's node, with the
+  # same text. Those of one robot stay different from each other, and equal ones stay equal.
+  #
+  # A profile is written once for the robot, not in each percept.
   alias Hal.Profile
 
   @reference :"$convoy_reference"

@@ -1,9 +1,8 @@
 defmodule Robot.Replay.Roles do
-  @moduledoc """
-  Describes what the processes of a robot do on an input (`Robot.Trace`), as functions of their
-  state: the same pure functions that they call, and the order in which they carry out the effects.
-  Pure if the mission is.
-  """
+  @moduledoc false
+  # Describes what the processes of a robot do on an input (`Robot.Trace`), as functions of their
+  # state: the same pure functions that they call, and the order in which they carry out the effects.
+  # Pure if the mission is.
   alias Robot.Control.Controller
   alias Robot.Mission.Runner
   alias Robot.Navigation.Grid

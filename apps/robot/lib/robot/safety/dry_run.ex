@@ -1,12 +1,11 @@
 defmodule Robot.Safety.DryRun do
-  @moduledoc """
-  Lets a robot run without moving (R44): with `dry_run: true` in `Robot.Config` it perceives, decides and communicates
-  as usual, but commands for the wheels and the camera's head are printed instead of sent. A person can compare them
-  with what they expect before the wheels may turn.
-
-  The gate keeps commanding the wheels to stand, and their device, which owns the hardware, never
-  arms (`Hal.Device.Arming`). The events are `[:robot, :dry_run]`; the log prints them.
-  """
+  @moduledoc false
+  # Lets a robot run without moving (R44): with `dry_run: true` in `Robot.Config` it perceives, decides and communicates
+  # as usual, but commands for the wheels and the camera's head are printed instead of sent. A person can compare them
+  # with what they expect before the wheels may turn.
+  #
+  # The gate keeps commanding the wheels to stand, and their device, which owns the hardware, never
+  # arms (`Hal.Device.Arming`). The events are `[:robot, :dry_run]`; the log prints them.
   require Logger
   alias Hal.{Event, Twist}
 

@@ -1,12 +1,11 @@
 defmodule Sim.Chaos.Shrink do
-  @moduledoc """
-  Looks for the smallest run that is still wrong. Pure; the same run and judge give the same result.
-
-  What is taken away, in this order, again and again until nothing more can be: time after the
-  violation, events, robots with the events that name them, loss, copies, delays, noise, and whatever
-  else differs from the defaults. Each smaller run is judged; one that is still wrong replaces the
-  larger one.
-  """
+  @moduledoc false
+  # Looks for the smallest run that is still wrong. Pure; the same run and judge give the same result.
+  #
+  # What is taken away, in this order, again and again until nothing more can be: time after the
+  # violation, events, robots with the events that name them, loss, copies, delays, noise, and whatever
+  # else differs from the defaults. Each smaller run is judged; one that is still wrong replaces the
+  # larger one.
 
   @typedoc "When a run is wrong, in milliseconds; `nil` if it is not, or cannot be made."
   @type judge :: (keyword() -> non_neg_integer() | nil)

@@ -1,7 +1,6 @@
 defmodule Sim.Compute.Columns do
-  @moduledoc """
-  Paints one column of a picture at a time, in plain Elixir: the reference for `paint.c`. Pure.
-  """
+  @moduledoc false
+  # Paints one column of a picture at a time, in plain Elixir: the reference for `paint.c`. Pure.
   alias Sim.Compute.Rays
 
   @nearest 0.01

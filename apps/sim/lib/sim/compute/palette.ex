@@ -1,8 +1,7 @@
 defmodule Sim.Compute.Palette do
-  @moduledoc """
-  Lists the colours of simulated objects: their paint, the colour class they match, and the relation of their blobs to
-  distance. Pure.
-  """
+  @moduledoc false
+  # Lists the colours of simulated objects: their paint, the colour class they match, and the relation of their blobs to
+  # distance. Pure.
 
   @enforce_keys [:name, :paint, :rgb, :thresholds, :constant]
   defstruct @enforce_keys

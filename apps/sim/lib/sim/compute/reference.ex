@@ -1,8 +1,7 @@
 defmodule Sim.Compute.Reference do
-  @moduledoc """
-  Implements the kernels in plain Elixir, as their reference, with the arguments of `Sim.Compute.Native`. Every
-  operation and its order are the same in C. Pure.
-  """
+  @moduledoc false
+  # Implements the kernels in plain Elixir, as their reference, with the arguments of `Sim.Compute.Native`. Every
+  # operation and its order are the same in C. Pure.
   alias Sim.Compute.{Columns, Rays}
   alias Sim.Noise
 

@@ -1,8 +1,7 @@
 defmodule Sim.Compute.Regions do
-  @moduledoc """
-  Joins the pieces of poles that a picture shows to regions: the reference of `Sim.Compute.Native.join/2`, which gives the
-  same, in the same order. Pure.
-  """
+  @moduledoc false
+  # Joins the pieces of poles that a picture shows to regions: the reference of `Sim.Compute.Native.join/2`, which gives the
+  # same, in the same order. Pure.
 
   @typedoc """
   The number of its kind, its area, its left, right, top and bottom, the sum of the columns of its pixels, and twice that

@@ -1,9 +1,8 @@
 defmodule Sim.Fleet.Folder do
-  @moduledoc """
-  Makes a run's own temporary folder, which only this user can read. It is removed with the process that made it,
-  however that ends, by a signal to all of the VM or by its crash: a shell holds the other end of a pipe, and removes
-  the folder when the pipe is closed. Should the shell be killed as well, the next run removes what is left.
-  """
+  @moduledoc false
+  # Makes a run's own temporary folder, which only this user can read. It is removed with the process that made it,
+  # however that ends, by a signal to all of the VM or by its crash: a shell holds the other end of a pipe, and removes
+  # the folder when the pipe is closed. Should the shell be killed as well, the next run removes what is left.
 
   # It reads until the VM has ended in any way, or the process whose port this is. What other
   # processes, which end at the same time, may still write is removed a second later.

@@ -1,9 +1,8 @@
 defmodule Sim.Fleet.Mission do
-  @moduledoc """
-  Reads the option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start it; a name
-  (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`. Pure, except that
-  it loads the module.
-  """
+  @moduledoc false
+  # Reads the option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start it; a name
+  # (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`. Pure, except that
+  # it loads the module.
   alias Sim.Trial.Setup
   alias Swarm.Missions
 

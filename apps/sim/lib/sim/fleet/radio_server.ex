@@ -1,8 +1,7 @@
 defmodule Sim.Fleet.RadioServer do
-  @moduledoc """
-  Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
-  that loses and delays messages by `Sim.Radio`.
-  """
+  @moduledoc false
+  # Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
+  # that loses and delays messages by `Sim.Radio`.
   use GenServer
   alias Robot.Names
   alias Sim.Radio

@@ -1,13 +1,12 @@
 defmodule Sim.Fleet.Said do
-  @moduledoc """
-  Holds back announcements of a live fleet (one leads, its fleet is formed) until the robots'
-  claims show them. Pure.
-
-  A robot reports a stage by an event, and claims the same on its board, which the fleet reads ten
-  times a second. If the stage were announced at once, it would be on the screen while the run log
-  still says the opposite. So it waits for the claim. If no claim shows it within 5 readings (0.5
-  s), it was withdrawn at once, and is announced all the same, because it was reported.
-  """
+  @moduledoc false
+  # Holds back announcements of a live fleet (one leads, its fleet is formed) until the robots'
+  # claims show them. Pure.
+  #
+  # A robot reports a stage by an event, and claims the same on its board, which the fleet reads ten
+  # times a second. If the stage were announced at once, it would be on the screen while the run log
+  # still says the opposite. So it waits for the claim. If no claim shows it within 5 readings (0.5
+  # s), it was withdrawn at once, and is announced all the same, because it was reported.
 
   @looks 5
 

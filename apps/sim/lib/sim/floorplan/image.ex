@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Image do
-  @moduledoc """
-  Reads maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
-  or a description in YAML as map_server writes it, `FILE.yaml`, which names the picture and says where the origin is.
-  """
+  @moduledoc false
+  # Reads maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
+  # or a description in YAML as map_server writes it, `FILE.yaml`, which names the picture and says where the origin is.
   alias Robot.Navigation.MapFile
   alias Robot.Navigation.MapFile.Picture
   alias Sim.Compute

@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Packing do
-  @moduledoc """
-  Places start poses on cells that are given: at random from a seed, and if that leaves no room for the last ones, row
-  by row as close as is allowed. Pure.
-  """
+  @moduledoc false
+  # Places start poses on cells that are given: at random from a seed, and if that leaves no room for the last ones, row
+  # by row as close as is allowed. Pure.
   alias Hal.Pose
   alias Sim.Floorplan.Cells
   alias Sim.Noise

@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Rooms do
-  @moduledoc """
-  Finds the rooms of a map: areas of places that are far enough from all walls to start there, so that a door ends a
-  room. Pure.
-  """
+  @moduledoc false
+  # Finds the rooms of a map: areas of places that are far enough from all walls to start there, so that a door ends a
+  # room. Pure.
   alias Hal.Pose
   alias Robot.Navigation.MapFile.Runs
   alias Sim.Floorplan.Cells

@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Search do
-  @moduledoc """
-  Searches a map for places where a fleet can start together, with ways of a certain width between
-  them. Pure.
-  """
+  @moduledoc false
+  # Searches a map for places where a fleet can start together, with ways of a certain width between
+  # them. Pure.
   alias Hal.Pose
   alias Sim.Floorplan
   alias Sim.Floorplan.{Clearance, Flood, Cells, Packing, Rooms}

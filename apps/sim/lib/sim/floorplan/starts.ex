@@ -1,11 +1,10 @@
 defmodule Sim.Floorplan.Starts do
-  @moduledoc """
-  Chooses the start poses of a fleet: spread over the free area of a map, from a seed. Pure.
-
-  Each robot has a straight free way to the landmark or to a robot placed before it, so that no
-  robot starts in a closed room of an unknown map. The middle of the room is tried first, then all
-  of it.
-  """
+  @moduledoc false
+  # Chooses the start poses of a fleet: spread over the free area of a map, from a seed. Pure.
+  #
+  # Each robot has a straight free way to the landmark or to a robot placed before it, so that no
+  # robot starts in a closed room of an unknown map. The middle of the room is tried first, then all
+  # of it.
   alias Hal.Pose
   alias Sim.Floorplan.{Clearance, Cells}
   alias Sim.Noise

@@ -1,12 +1,11 @@
 defmodule Sim.Node.Reporter do
-  @moduledoc """
-  Reports the state of its part to a fleet's launcher, ten times a second, and each stage of a
-  robot of this node. If the launcher cannot be reached at once, the report is dropped: the next
-  one is newer.
-
-  It sends messages `{Sim.Node.Reporter, pid, what}` with the number of this process of the
-  operating system, where `what` is `{:up, facts}`, `{:report, term}` or `{:stage, about}`.
-  """
+  @moduledoc false
+  # Reports the state of its part to a fleet's launcher, ten times a second, and each stage of a
+  # robot of this node. If the launcher cannot be reached at once, the report is dropped: the next
+  # one is newer.
+  #
+  # It sends messages `{Sim.Node.Reporter, pid, what}` with the number of this process of the
+  # operating system, where `what` is `{:up, facts}`, `{:report, term}` or `{:stage, about}`.
   use GenServer
   alias Hal.{Event, Ticker}
 

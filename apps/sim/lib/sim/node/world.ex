@@ -1,8 +1,7 @@
 defmodule Sim.Node.World do
-  @moduledoc """
-  Runs the world as the part of a node: `Sim.World.Server`, found by its name on all nodes (`Sim.World.Directory`). It
-  reports snapshots, from which it can be started again. Options: `name`, `world`.
-  """
+  @moduledoc false
+  # Runs the world as the part of a node: `Sim.World.Server`, found by its name on all nodes (`Sim.World.Directory`). It
+  # reports snapshots, from which it can be started again. Options: `name`, `world`.
   @behaviour Sim.Node
   alias Sim.World
   alias Sim.World.Snapshot

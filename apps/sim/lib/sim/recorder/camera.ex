@@ -1,9 +1,8 @@
 defmodule Sim.Recorder.Camera do
-  @moduledoc """
-  Makes JPEG pictures of frames for a recording, one after another, with an ffmpeg that belongs to
-  the calling process (`Vision.Jpeg.Encoder`), which must trap exits. It waits for each picture: a run
-  in lockstep has no clock that would go on meanwhile, and the same run gives the same pictures.
-  """
+  @moduledoc false
+  # Makes JPEG pictures of frames for a recording, one after another, with an ffmpeg that belongs to
+  # the calling process (`Vision.Jpeg.Encoder`), which must trap exits. It waits for each picture: a run
+  # in lockstep has no clock that would go on meanwhile, and the same run gives the same pictures.
   alias Hal.Frame
   alias Vision.Jpeg.Encoder
 

@@ -1,12 +1,11 @@
 defmodule Sim.Recording.Tick do
-  @moduledoc """
-  Packs a tick of a run into the form in which a recording holds it. Pure.
-
-  A recording must cost its run next to nothing, and most of a tick is the same again and again: a
-  message is among the effects of its sender and among the inputs of each robot that hears it, and
-  every struct has the names of its fields. So each message is written once, and its copies as its
-  number; what comes in each tick is written without names. What else there is stays as it is.
-  """
+  @moduledoc false
+  # Packs a tick of a run into the form in which a recording holds it. Pure.
+  #
+  # A recording must cost its run next to nothing, and most of a tick is the same again and again: a
+  # message is among the effects of its sender and among the inputs of each robot that hears it, and
+  # every struct has the names of its fields. So each message is written once, and its copies as its
+  # number; what comes in each tick is written without names. What else there is stays as it is.
   alias Hal.{Odometry, Pose, Twist}
   alias Sim.Recording.Tick.Unpack
   alias Vision.{Blob, Detections}

@@ -1,8 +1,7 @@
 defmodule Sim.Scenario.Names do
-  @moduledoc """
-  Lists the names that robots of a scenario may have: `mag1` to `mag100` and `min1` to `min100`. Pure. The module holds
-  them all, so a file that names one makes no atom.
-  """
+  @moduledoc false
+  # Lists the names that robots of a scenario may have: `mag1` to `mag100` and `min1` to `min100`. Pure. The module holds
+  # them all, so a file that names one makes no atom.
 
   @most 100
   @magellans for n <- 1..@most, do: :"mag#{n}"

@@ -1,7 +1,6 @@
 defmodule Sim.Scenario.View do
-  @moduledoc """
-  Describes what expectations look at in a run: the true state of the world, and what robots claim. Pure.
-  """
+  @moduledoc false
+  # Describes what expectations look at in a run: the true state of the world, and what robots claim. Pure.
   alias Hal.Pose
   alias Robot.Mission.Runner
   alias Sim.{Radio, Scene, Trial, World}

@@ -1,12 +1,11 @@
 defmodule Sim.Trial.AgreementMetrics do
-  @moduledoc """
-  Measures from outside how well a fleet agrees, for each part of a partitioned radio: how long a
-  part has two leaders; after a partition heals, when one robot leads all, when the fleet is in
-  formation, and how long robots stood still for that. Pure; fed every 100 ms.
-
-  A part is a set of robots that can reach each other, if necessary by way of others
-  (`Sim.Radio.parts/2`).
-  """
+  @moduledoc false
+  # Measures from outside how well a fleet agrees, for each part of a partitioned radio: how long a
+  # part has two leaders; after a partition heals, when one robot leads all, when the fleet is in
+  # formation, and how long robots stood still for that. Pure; fed every 100 ms.
+  #
+  # A part is a set of robots that can reach each other, if necessary by way of others
+  # (`Sim.Radio.parts/2`).
 
   defstruct rivals_ms: nil, rivals_worst_ms: 0, parts: nil, heals: []
 

@@ -1,8 +1,7 @@
 defmodule Sim.Trial.Evaluation do
-  @moduledoc """
-  Evaluates a run from outside, by true poses: how far each robot is from its slot, relative to
-  the leader's true pose. Robots never see this. Pure.
-  """
+  @moduledoc false
+  # Evaluates a run from outside, by true poses: how far each robot is from its slot, relative to
+  # the leader's true pose. Robots never see this. Pure.
   alias Hal.Pose
   alias Missions.Landmark.{Claim, Reference, SlotPoses}
   alias Sim.{Scene, World}

@@ -1,8 +1,7 @@
 defmodule Sim.Trial.Faults do
-  @moduledoc """
-  Describes what robots of a run lack for a time: their processor, their camera, their ears. Pure; times in
-  milliseconds.
-  """
+  @moduledoc false
+  # Describes what robots of a run lack for a time: their processor, their camera, their ears. Pure; times in
+  # milliseconds.
 
   # A real base stops its wheels when no speed has come for so long (`Sim.World.Server`).
   @wheels_ms 200

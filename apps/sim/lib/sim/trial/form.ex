@@ -1,11 +1,10 @@
 defmodule Sim.Trial.Form do
-  @moduledoc """
-  Checks values of the form `{name, value, …, key: value}`, such as events of a script and
-  expectations of a scenario. Pure; makes no atoms.
-
-  A form is `{name, values, keys}`: `values` are `{label, type}`, `keys` is a table of
-  `Hal.Options`. A name alone stands for `{name}`.
-  """
+  @moduledoc false
+  # Checks values of the form `{name, value, …, key: value}`, such as events of a script and
+  # expectations of a scenario. Pure; makes no atoms.
+  #
+  # A form is `{name, values, keys}`: `values` are `{label, type}`, `keys` is a table of
+  # `Hal.Options`. A name alone stands for `{name}`.
   alias Hal.Options.{Suggest, Type, Wording}
 
   @type form :: {atom(), [{atom(), Type.t()}], Hal.Options.table()}

@@ -1,8 +1,7 @@
 defmodule Sim.Trial.Mechanics do
-  @moduledoc """
-  Describes what moves the world of a run, senses it, and judges the fleet in it; the same for a run
-  (`Sim.Trial`) and for its replay (`Sim.Replay`). Pure.
-  """
+  @moduledoc false
+  # Describes what moves the world of a run, senses it, and judges the fleet in it; the same for a run
+  # (`Sim.Trial`) and for its replay (`Sim.Replay`). Pure.
   alias Hal.Twist
   alias Sim.{Radio, World}
   alias Sim.Trial.{Cuts, Evaluation, Faults, Memory, RunLog}

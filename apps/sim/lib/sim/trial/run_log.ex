@@ -1,8 +1,7 @@
 defmodule Sim.Trial.RunLog do
-  @moduledoc """
-  Records a run: its stages, its leaders, how long it was in formation. Pure; fed every 100 ms
-  with what the living robots claim.
-  """
+  @moduledoc false
+  # Records a run: its stages, its leaders, how long it was in formation. Pure; fed every 100 ms
+  # with what the living robots claim.
 
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 

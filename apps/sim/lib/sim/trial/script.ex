@@ -1,8 +1,7 @@
 defmodule Sim.Trial.Script do
-  @moduledoc """
-  Describes what is done to a run and when: moves of the landmark, kills, and all other events
-  (`Sim.Trial.Event`). Pure; times in milliseconds.
-  """
+  @moduledoc false
+  # Describes what is done to a run and when: moves of the landmark, kills, and all other events
+  # (`Sim.Trial.Event`). Pure; times in milliseconds.
   alias Sim.Trial.Event
 
   @enforce_keys [:pending]

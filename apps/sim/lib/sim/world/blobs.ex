@@ -1,8 +1,7 @@
 defmodule Sim.World.Blobs do
-  @moduledoc """
-  Computes the blobs of a robot's picture from geometry alone, without painting pixels. For large
-  fleets; tests compare it with painting. Pure.
-  """
+  @moduledoc false
+  # Computes the blobs of a robot's picture from geometry alone, without painting pixels. For large
+  # fleets; tests compare it with painting. Pure.
   alias Sim.{Compute, Noise}
   alias Sim.Compute.Palette
   alias Sim.World.CameraFrustum

@@ -1,22 +1,21 @@
 defmodule Sim.World.Body do
-  @moduledoc """
-  Models one robot's body in the world: wheels, odometry, pan-tilt unit, bumpers. Pure.
-
-  The wheels follow the wanted speed with the profile's accelerations and a first-order lag of
-  0.1 s; poses are integrated with the mean heading of a step. A body that is stopped by a wall
-  or another body stalls its wheels: they do not slip.
-
-  Odometry has errors according to `noise`: `:default` draws for each robot a scale error and a
-  turn error of 0.3 %, of either sign, and adds 1e-6 m2 of variance per metre to each wheel;
-  `:slip` adds the behaviour of skid-steered bases (R74): a turn to the left goes 5.5 % further
-  than the wheels say, a turn to the right 5.5 % less far, and each turn has a random error of 1.7
-  % more (1.5 degrees in 90).
-
-  In addition a body may have wheels that differ from what its odometry assumes, whatever the
-  noise: `wheels` with `distance` (true metres per counted metre), `base` (true wheel base
-  relative to the profile's) and `ratio` (true distance of the right wheel relative to the left
-  one's when odometry counts the same); each 1.0 unless given. Calibration finds these.
-  """
+  @moduledoc false
+  # Models one robot's body in the world: wheels, odometry, pan-tilt unit, bumpers. Pure.
+  #
+  # The wheels follow the wanted speed with the profile's accelerations and a first-order lag of
+  # 0.1 s; poses are integrated with the mean heading of a step. A body that is stopped by a wall
+  # or another body stalls its wheels: they do not slip.
+  #
+  # Odometry has errors according to `noise`: `:default` draws for each robot a scale error and a
+  # turn error of 0.3 %, of either sign, and adds 1e-6 m2 of variance per metre to each wheel;
+  # `:slip` adds the behaviour of skid-steered bases (R74): a turn to the left goes 5.5 % further
+  # than the wheels say, a turn to the right 5.5 % less far, and each turn has a random error of 1.7
+  # % more (1.5 degrees in 90).
+  #
+  # In addition a body may have wheels that differ from what its odometry assumes, whatever the
+  # noise: `wheels` with `distance` (true metres per counted metre), `base` (true wheel base
+  # relative to the profile's) and `ratio` (true distance of the right wheel relative to the left
+  # one's when odometry counts the same); each 1.0 unless given. Calibration finds these.
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Sim.{Noise, Trig}
 

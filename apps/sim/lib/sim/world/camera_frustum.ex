@@ -1,10 +1,9 @@
 defmodule Sim.World.CameraFrustum do
-  @moduledoc """
-  Places a robot's camera, and tells what its picture can contain. Pure.
-
-  A pinhole camera above the robot's centre. Tilt moves the horizon as if the film were shifted,
-  so that vertical edges stay columns. Pixel centres lie at whole numbers.
-  """
+  @moduledoc false
+  # Places a robot's camera, and tells what its picture can contain. Pure.
+  #
+  # A pinhole camera above the robot's centre. Tilt moves the horizon as if the film were shifted,
+  # so that vertical edges stay columns. Pixel centres lie at whole numbers.
   alias Sim.Trig
 
   @enforce_keys [:x, :y, :cosine, :sine, :eye, :focal, :horizon, :width, :height]

@@ -1,8 +1,7 @@
 defmodule Sim.World.Contact do
-  @moduledoc """
-  Contacts between bodies, which are discs: how far one may go before it touches a wall or
-  another, and which ones touch. Pure.
-  """
+  @moduledoc false
+  # Contacts between bodies, which are discs: how far one may go before it touches a wall or
+  # another, and which ones touch. Pure.
   alias Hal.Pose
   alias Sim.Floorplan
 

@@ -1,8 +1,7 @@
 defmodule Swarm.Blackboard.AntiEntropy do
-  @moduledoc """
-  Finds missing rows in three messages: a digest; the other's stamps where it differs; the rows
-  that are newer here, and a request for those that are missing here. Pure.
-  """
+  @moduledoc false
+  # Finds missing rows in three messages: a digest; the other's stamps where it differs; the rows
+  # that are newer here, and a request for those that are missing here. Pure.
   alias Swarm.Blackboard.{Codec, Rows, State}
 
   @hashes 4_294_967_296

@@ -1,9 +1,8 @@
 defmodule Swarm.Blackboard.Expiry do
-  @moduledoc """
-  Decides which rows a board forgets once they are ten minutes old: robots of which nothing is newer,
-  words of former lives, and deleted hints; words of this life of this node's own robots never.
-  Pure.
-  """
+  @moduledoc false
+  # Decides which rows a board forgets once they are ten minutes old: robots of which nothing is newer,
+  # words of former lives, and deleted hints; words of this life of this node's own robots never.
+  # Pure.
   alias Swarm.Blackboard.{Rows, State}
 
   @forget_ms 600_000

@@ -1,7 +1,6 @@
 defmodule Swarm.Blackboard.Gossip do
-  @moduledoc """
-  Sends from a blackboard to other nodes by a transport `{m, f, a}`, which a test may replace.
-  """
+  @moduledoc false
+  # Sends from a blackboard to other nodes by a transport `{m, f, a}`, which a test may replace.
 
   @type call :: {module(), atom(), list()}
 

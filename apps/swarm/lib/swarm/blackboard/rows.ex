@@ -1,18 +1,17 @@
 defmodule Swarm.Blackboard.Rows do
-  @moduledoc """
-  Holds the rows of a node, `owner -> key -> {stamp, value, since when}`: of two rows the higher stamp wins, in whatever
-  order they arrive. Pure.
-
-  An owner is a robot, whose rows have one writer and stamps `{incarnation, sequence}`, or a
-  bucket of hints, which any robot writes. A hint's stamp is `{count, {writer, check}}`: a count
-  above all that its writer had seen, the writer's name, and a hash of the value. There are 16
-  buckets, chosen by the key's number, so that two nodes need not exchange all hints if one
-  differs.
-
-  A row has an age instead of a time of day: it travels with its age at sending, and each node
-  adds how long it has held the row. The time of transport is not included, so of two ages of one
-  row the higher is nearer to the truth.
-  """
+  @moduledoc false
+  # Holds the rows of a node, `owner -> key -> {stamp, value, since when}`: of two rows the higher stamp wins, in whatever
+  # order they arrive. Pure.
+  #
+  # An owner is a robot, whose rows have one writer and stamps `{incarnation, sequence}`, or a
+  # bucket of hints, which any robot writes. A hint's stamp is `{count, {writer, check}}`: a count
+  # above all that its writer had seen, the writer's name, and a hash of the value. There are 16
+  # buckets, chosen by the key's number, so that two nodes need not exchange all hints if one
+  # differs.
+  #
+  # A row has an age instead of a time of day: it travels with its age at sending, and each node
+  # adds how long it has held the row. The time of transport is not included, so of two ages of one
+  # row the higher is nearer to the truth.
   alias Swarm.Blackboard.State
 
   @buckets 16

@@ -1,8 +1,7 @@
 defmodule Swarm.Blackboard.Server do
-  @moduledoc """
-  Runs the process of `Swarm.Blackboard`: keeps the rows, and a table for readers; pushes what is
-  written here, stores what arrives, and repairs what was lost.
-  """
+  @moduledoc false
+  # Runs the process of `Swarm.Blackboard`: keeps the rows, and a table for readers; pushes what is
+  # written here, stores what arrives, and repairs what was lost.
   use GenServer
   alias Hal.Event
   alias Swarm.Blackboard

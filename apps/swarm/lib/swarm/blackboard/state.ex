@@ -1,19 +1,18 @@
 defmodule Swarm.Blackboard.State do
-  @moduledoc """
-  Holds what all robots publish about themselves, as one node knows it:
-  `{robot, key} -> {incarnation, sequence, value}`. Each row has one writer, the robot itself, and
-  the newest `{incarnation, sequence}` wins, so that rows may arrive late, twice, in any order and
-  through third parties. Besides rows there are hints, which all robots write (`put_hint/5`).
-  Pure; times are this node's own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
-
-  *Own* robots are those of this node (`enter/4`); `Swarm.Blackboard.Incarnation` says what becomes of what
-  others say of them.
-
-  A deleted hint stays for ten minutes with the value `""`, so that it does not come back.
-
-  Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
-  a value.
-  """
+  @moduledoc false
+  # Holds what all robots publish about themselves, as one node knows it:
+  # `{robot, key} -> {incarnation, sequence, value}`. Each row has one writer, the robot itself, and
+  # the newest `{incarnation, sequence}` wins, so that rows may arrive late, twice, in any order and
+  # through third parties. Besides rows there are hints, which all robots write (`put_hint/5`).
+  # Pure; times are this node's own, in milliseconds. `Swarm.Blackboard.Rows` holds the rows.
+  #
+  # *Own* robots are those of this node (`enter/4`); `Swarm.Blackboard.Incarnation` says what becomes of what
+  # others say of them.
+  #
+  # A deleted hint stays for ten minutes with the value `""`, so that it does not come back.
+  #
+  # Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
+  # a value.
   alias Swarm.Blackboard.{Expiry, Incarnation, Rows}
   alias Swarm.Wire.CounterGuard
 

@@ -1,8 +1,9 @@
 defmodule Swarm.Commands.Client do
-  @moduledoc false
-  # Sends requests to robots, wherever they are, and gathers their answers. Commands that stop a
-  # robot go to its e-stop process, all others to its comms process. Before an order to another
-  # node, the robot is asked for a stamp (`Swarm.Order.Freshness`).
+  @moduledoc """
+  Sends requests to robots, wherever they are, and gathers their answers. Commands that stop a
+  robot go to its e-stop process, all others to its comms process. Before an order to another
+  node, the robot is asked for a stamp (`Swarm.Order.Freshness`).
+  """
   alias Mesh.Nonblocking
   alias Swarm.{Directory, EStop, Replacement}
   alias Swarm.Order.Freshness

@@ -1,12 +1,11 @@
 defmodule Swarm.Comms.LoadShedder do
-  @moduledoc """
-  Keeps the mailbox of a robot's comms process small under a flood. A process cannot refuse messages, but it can
-  drop them faster than others send them: looking at a message costs far less than handling it.
-
-  Telemetry (messages from other robots) and junk are dropped first, the oldest before newer;
-  then, if there is still too much, commands, the mission's own letters and forged system
-  messages, if anybody sends so many. Timers stay. The rest keeps its order.
-  """
+  @moduledoc false
+  # Keeps the mailbox of a robot's comms process small under a flood. A process cannot refuse messages, but it can
+  # drop them faster than others send them: looking at a message costs far less than handling it.
+  #
+  # Telemetry (messages from other robots) and junk are dropped first, the oldest before newer;
+  # then, if there is still too much, commands, the mission's own letters and forged system
+  # messages, if anybody sends so many. Timers stay. The rest keeps its order.
 
   @most 2_000
   @keep 500

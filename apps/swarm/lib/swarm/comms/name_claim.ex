@@ -1,14 +1,13 @@
 defmodule Swarm.Comms.NameClaim do
-  @moduledoc """
-  Settles a robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
-  lower `{boot, node}` stays. The other leaves the directory and gives way, until the first has
-  been neither heard nor found in the directory for 10 s: perhaps it never existed, and somebody
-  only said so.
-
-  They find each other in the directory, where both comms processes are in the same group and tell
-  each other who they are once a second, or through the mesh, where each hears heartbeats that are
-  not its own.
-  """
+  @moduledoc false
+  # Settles a robot's claim to its name. Of two robots with the same name, on any nodes, the one with the
+  # lower `{boot, node}` stays. The other leaves the directory and gives way, until the first has
+  # been neither heard nor found in the directory for 10 s: perhaps it never existed, and somebody
+  # only said so.
+  #
+  # They find each other in the directory, where both comms processes are in the same group and tell
+  # each other who they are once a second, or through the mesh, where each hears heartbeats that are
+  # not its own.
   alias Mesh.Nonblocking
   alias Swarm.Directory
 

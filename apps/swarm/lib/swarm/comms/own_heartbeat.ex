@@ -1,7 +1,6 @@
 defmodule Swarm.Comms.OwnHeartbeat do
-  @moduledoc """
-  Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
-  """
+  @moduledoc false
+  # Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
   alias Robot.Board
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}

@@ -1,8 +1,7 @@
 defmodule Swarm.Comms.PeerWriter do
-  @moduledoc """
-  Writes the other robots to a robot's board: a row `{:peer, id}` for each, whenever it is heard
-  and once more when it is gone.
-  """
+  @moduledoc false
+  # Writes the other robots to a robot's board: a row `{:peer, id}` for each, whenever it is heard
+  # and once more when it is gone.
   alias Robot.Board
   alias Swarm.Membership.Peers
 

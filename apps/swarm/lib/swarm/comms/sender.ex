@@ -1,9 +1,8 @@
 defmodule Swarm.Comms.Sender do
-  @moduledoc """
-  Sends a robot's messages and heartbeats. It sends five heartbeats a second; when the emergency
-  stop changes, one at once and then ten a second for a second, so that the change spreads within
-  200 ms.
-  """
+  @moduledoc false
+  # Sends a robot's messages and heartbeats. It sends five heartbeats a second; when the emergency
+  # stop changes, one at once and then ten a second for a second, so that the change spreads within
+  # 200 ms.
   alias Robot.Board
   alias Swarm.{EStop, Message}
   alias Swarm.Comms.OwnHeartbeat

@@ -1,8 +1,7 @@
 defmodule Swarm.EStop.Actions do
-  @moduledoc """
-  Carries out the actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of the stop,
-  and spreads it.
-  """
+  @moduledoc false
+  # Carries out the actions of a robot's e-stop process (`Swarm.EStop`): stops, releases, records the state of the stop,
+  # and spreads it.
   alias Hal.Device
   alias Robot.{Board, Names}
   alias Robot.Control.Pilot

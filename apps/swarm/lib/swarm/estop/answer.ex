@@ -1,7 +1,6 @@
 defmodule Swarm.EStop.Answer do
-  @moduledoc """
-  Answers for a gate that has carried out a stop, to the e-stop process or to the caller.
-  """
+  @moduledoc false
+  # Answers for a gate that has carried out a stop, to the e-stop process or to the caller.
   alias Hal.Device
   alias Robot.{Board, Names}
   alias Robot.Safety.Readiness

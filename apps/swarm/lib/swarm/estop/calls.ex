@@ -1,13 +1,12 @@
 defmodule Swarm.EStop.Calls do
-  @moduledoc """
-  Remembers which calls to stop were heard (`Swarm.EStop.Broadcaster`). A call is sent many times
-  and arrives by several ways; it counts once. Pure.
-
-  Of each life of a node the last call is remembered, with the 64 counters up to its own: a call
-  that was overtaken by a later one does not stop anything again. A call that is farther from it
-  is remembered beside it, so that a wrong counter, however high, hides no later call: at worst a
-  robot stops once more. At most 64 are remembered in all.
-  """
+  @moduledoc false
+  # Remembers which calls to stop were heard (`Swarm.EStop.Broadcaster`). A call is sent many times
+  # and arrives by several ways; it counts once. Pure.
+  #
+  # Of each life of a node the last call is remembered, with the 64 counters up to its own: a call
+  # that was overtaken by a later one does not stop anything again. A call that is farther from it
+  # is remembered beside it, so that a wrong counter, however high, hides no later call: at worst a
+  # robot stops once more. At most 64 are remembered in all.
   alias Swarm.Wire
 
   @most 64

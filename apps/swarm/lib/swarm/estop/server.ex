@@ -1,7 +1,6 @@
 defmodule Swarm.EStop.Server do
-  @moduledoc """
-  Runs the process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
-  """
+  @moduledoc false
+  # Runs the process of `Swarm.EStop`: receives messages, which `Swarm.EStop.Actions` carries out.
   use Hal.HardenedServer
   alias Robot.{Board, Names}
   alias Robot.Safety.Gate

@@ -1,8 +1,7 @@
 defmodule Swarm.Replacement.Admission do
-  @moduledoc """
-  Decides whether an order is carried out: by whom it is signed, and for when; whether its robots allow it now; whether its code may
-  come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
-  """
+  @moduledoc false
+  # Decides whether an order is carried out: by whom it is signed, and for when; whether its robots allow it now; whether its code may
+  # come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
   alias Swarm.Replacement
   alias Robot.Names
   alias Swarm.Replacement.{Entries, Job, Order}

@@ -1,11 +1,10 @@
 defmodule Swarm.Replacement.Code do
-  @moduledoc """
-  Decides which code an order may bring, and its way into the node and out again.
-
-  An order may bring a mission (`Robot.Mission`) and modules below its name, `Ours.Gather` and `Ours.Gather.Circle`.
-  Each must be one that this node does not have, or belong to an application in which missions live
-  (`Swarm.Missions.apps/0`): never to one that carries the robot.
-  """
+  @moduledoc false
+  # Decides which code an order may bring, and its way into the node and out again.
+  #
+  # An order may bring a mission (`Robot.Mission`) and modules below its name, `Ours.Gather` and `Ours.Gather.Circle`.
+  # Each must be one that this node does not have, or belong to an application in which missions live
+  # (`Swarm.Missions.apps/0`): never to one that carries the robot.
   alias Hal.Options.Wording
   alias Swarm.Missions
   alias Swarm.Replacement.Order

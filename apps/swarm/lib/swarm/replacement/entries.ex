@@ -1,8 +1,7 @@
 defmodule Swarm.Replacement.Entries do
-  @moduledoc """
-  Describes what `Swarm.Replacement.Server` reads on the boards of its node's robots, and what it writes there for people. A robot
-  that has just ended has no entries.
-  """
+  @moduledoc false
+  # Describes what `Swarm.Replacement.Server` reads on the boards of its node's robots, and what it writes there for people. A robot
+  # that has just ended has no entries.
   alias Hal.Event
   alias Robot.{Board, Names}
   alias Robot.Mission.Manual

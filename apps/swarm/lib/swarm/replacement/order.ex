@@ -1,16 +1,15 @@
 defmodule Swarm.Replacement.Order do
-  @moduledoc """
-  Encodes the order that replaces a mission, as bytes, with its signature. Pure.
-
-  Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
-  options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
-  byte of it becomes an atom before the signature was checked, and names of options only after the code that
-  knows them was loaded.
-
-  The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
-  robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
-  for half a second, and a robot takes one of each time.
-  """
+  @moduledoc false
+  # Encodes the order that replaces a mission, as bytes, with its signature. Pure.
+  #
+  # Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
+  # options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
+  # byte of it becomes an atom before the signature was checked, and names of options only after the code that
+  # knows them was loaded.
+  #
+  # The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
+  # robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
+  # for half a second, and a robot takes one of each time.
   alias Swarm.Order.Freshness
   alias Swarm.Wire
 

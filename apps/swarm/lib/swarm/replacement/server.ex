@@ -1,9 +1,8 @@
 defmodule Swarm.Replacement.Server do
-  @moduledoc """
-  Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
-  the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
-  its successor brings back the release.
-  """
+  @moduledoc false
+  # Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
+  # the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
+  # its successor brings back the release.
   use Hal.HardenedServer
   alias Swarm.Replacement
   alias Hal.{Event, HardenedServer}

@@ -1,9 +1,8 @@
 defmodule Swarm.Status.Row do
-  @moduledoc """
-  Packs a robot's status into a row of the blackboard, for nodes that cannot reach it: small, in whole numbers (mm,
-  mrad, mm/s) and text. Pure. It omits the normal case: wheels that may turn, devices that are present, parts that do
-  not hang. `uncertainty` is that of the pose in mm, if known.
-  """
+  @moduledoc false
+  # Packs a robot's status into a row of the blackboard, for nodes that cannot reach it: small, in whole numbers (mm,
+  # mrad, mm/s) and text. Pure. It omits the normal case: wheels that may turn, devices that are present, parts that do
+  # not hang. `uncertainty` is that of the pose in mm, if known.
   alias Hal.Pose
   alias Swarm.Status
   alias Swarm.Wire

@@ -1,7 +1,6 @@
 defmodule Swarm.Wire.StopTags do
-  @moduledoc """
-  Describes what a heartbeat says of the emergency stops that hold its robot: their tags (`Swarm.EStop.State`), at most 16. Pure.
-  """
+  @moduledoc false
+  # Describes what a heartbeat says of the emergency stops that hold its robot: their tags (`Swarm.EStop.State`), at most 16. Pure.
 
   @most 16
   @last 0xFFFFFFFF

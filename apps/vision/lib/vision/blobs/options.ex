@@ -1,7 +1,6 @@
 defmodule Vision.Blobs.Options do
-  @moduledoc """
-  Parses the command line of `mix blobs` into a checked map, or one line that says what is wrong.
-  """
+  @moduledoc false
+  # Parses the command line of `mix blobs` into a checked map, or one line that says what is wrong.
 
   alias Hal.Camera.Source
   alias Hal.CommandOutput

@@ -1,9 +1,8 @@
 defmodule Vision.Calibration.Match do
-  @moduledoc """
-  Measures how well a colour's limits separate an object from the rest of a picture. Pure.
-
-  A blob that touches one of the places is part of the object; every other blob is background.
-  """
+  @moduledoc false
+  # Measures how well a colour's limits separate an object from the rest of a picture. Pure.
+  #
+  # A blob that touches one of the places is part of the object; every other blob is background.
   alias Hal.Frame
   alias Vision.{Blob, Colours, Pixels}
   alias Vision.Calibration.Sample

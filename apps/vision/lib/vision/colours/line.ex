@@ -1,10 +1,9 @@
 defmodule Vision.Colours.Line do
-  @moduledoc """
-  Reads the lines of a CMVision colour file, from left to right, as C's `scanf` does: what was read once is not read again
-  as something else. Pure.
-
-  The name of a colour is a word; what begins with `#` is a remark, not a name. Remarks may follow a line.
-  """
+  @moduledoc false
+  # Reads the lines of a CMVision colour file, from left to right, as C's `scanf` does: what was read once is not read again
+  # as something else. Pure.
+  #
+  # The name of a colour is a word; what begins with `#` is a remark, not a name. Remarks may follow a line.
 
   @doc """
   What a line of a section says after its first bracket.

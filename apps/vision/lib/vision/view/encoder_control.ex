@@ -1,13 +1,12 @@
 defmodule Vision.View.EncoderControl do
-  @moduledoc """
-  Encodes frames as pictures, one at a time, with an encoder that runs only while it is needed: it
-  is started for the first frame, for frames of another shape, and after a failure; it is closed
-  after 5 s without a picture.
-
-  After an encoder has ended, or has needed more than 5 s for a picture, there is a pause of
-  100 ms, 200 ms, … up to 5 s. The owner must trap exits and pass all messages to `handle/3`.
-  Times are integer milliseconds.
-  """
+  @moduledoc false
+  # Encodes frames as pictures, one at a time, with an encoder that runs only while it is needed: it
+  # is started for the first frame, for frames of another shape, and after a failure; it is closed
+  # after 5 s without a picture.
+  #
+  # After an encoder has ended, or has needed more than 5 s for a picture, there is a pause of
+  # 100 ms, 200 ms, … up to 5 s. The owner must trap exits and pass all messages to `handle/3`.
+  # Times are integer milliseconds.
   alias Hal.{Event, Frame}
   alias Vision.Jpeg.Encoder
   alias Vision.View.Picture

@@ -1,9 +1,8 @@
 defmodule Vision.View.Server do
-  @moduledoc """
-  Runs the process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
-  with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
-  the camera or ffmpeg.
-  """
+  @moduledoc false
+  # Runs the process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
+  # with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
+  # the camera or ffmpeg.
   use Hal.HardenedServer
   alias Hal.Frame
   alias Hal.Device.Words

@@ -1,11 +1,10 @@
 defmodule Console.Live.Mesh.Frames do
-  @moduledoc """
-  Decides which robots' poses are known to be in one frame, so that they can be drawn on one floor. Pure.
-
-  A leader's pose is in the frame that it was in before and in the one that it defines, a follower's in its leader's, and
-  all others' in that of the start poses. Files that put two robots on one place cannot both be right: what is only known
-  by such a start is not known to others. Nor is the place of a robot that was started again on its way.
-  """
+  @moduledoc false
+  # Decides which robots' poses are known to be in one frame, so that they can be drawn on one floor. Pure.
+  #
+  # A leader's pose is in the frame that it was in before and in the one that it defines, a follower's in its leader's, and
+  # all others' in that of the start poses. Files that put two robots on one place cannot both be right: what is only known
+  # by such a start is not known to others. Nor is the place of a robot that was started again on its way.
   alias Hal.Pose
   alias Sim.Trial.Setup
   alias Swarm.Status

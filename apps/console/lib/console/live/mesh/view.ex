@@ -1,11 +1,10 @@
 defmodule Console.Live.Mesh.View do
-  @moduledoc """
-  Describes what is shown of the robots of a mesh, from one look at their status to the next: a scene without a map, and what has
-  changed as lines. Pure.
-
-  Poses are those of the status, each with the number of its frame (`Console.Live.Mesh.Frames`): robots of different ones
-  are not drawn on one floor.
-  """
+  @moduledoc false
+  # Describes what is shown of the robots of a mesh, from one look at their status to the next: a scene without a map, and what has
+  # changed as lines. Pure.
+  #
+  # Poses are those of the status, each with the number of its frame (`Console.Live.Mesh.Frames`): robots of different ones
+  # are not drawn on one floor.
   alias Console.Live.Mesh.Frames
   alias Sim.Scene
   alias Sim.Trial.Setup

@@ -1,10 +1,9 @@
 defmodule Hal.RFlex.Protocol.Command do
-  @moduledoc """
-  Encodes the commands to the controller as bytes to write to the line. Pure; raw units.
-
-  Axis 0 moves, axis 1 turns. A speed is always two frames, one for each axis. Torques and the
-  acceleration of axis 1 are the constants that public drivers send.
-  """
+  @moduledoc false
+  # Encodes the commands to the controller as bytes to write to the line. Pure; raw units.
+  #
+  # Axis 0 moves, axis 1 turns. A speed is always two frames, one for each axis. Torques and the
+  # acceleration of axis 1 are the constants that public drivers send.
   import Bitwise
   alias Hal.RFlex.Protocol.Packet
 

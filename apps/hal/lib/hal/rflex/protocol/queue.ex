@@ -1,12 +1,11 @@
 defmodule Hal.RFlex.Protocol.Queue do
-  @moduledoc """
-  Decides which command to send next, and when: the controller loses commands that are less than
-  10 ms apart. Pure; the caller waits and writes.
-
-  Every command has a key. A newer command replaces a waiting one with the same key, and keeps its
-  place: so a key that is written often does not lose its turn, no outdated speed is sent, and
-  there are never more commands than keys. A stop discards the waiting speeds and goes first.
-  """
+  @moduledoc false
+  # Decides which command to send next, and when: the controller loses commands that are less than
+  # 10 ms apart. Pure; the caller waits and writes.
+  #
+  # Every command has a key. A newer command replaces a waiting one with the same key, and keeps its
+  # place: so a key that is written often does not lose its turn, no outdated speed is sent, and
+  # there are never more commands than keys. A stop discards the waiting speeds and goes first.
 
   @enforce_keys [:pace_ms]
   defstruct [:pace_ms, waiting: [], free_ms: nil]

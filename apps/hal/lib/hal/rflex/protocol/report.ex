@@ -1,9 +1,8 @@
 defmodule Hal.RFlex.Protocol.Report do
-  @moduledoc """
-  Decodes the controller's reports, in raw units. Pure. Of a report that is longer than
-  documented, the documented part is read; shorter ones are `:malformed`; undocumented ports and
-  opcodes are `:unknown`.
-  """
+  @moduledoc false
+  # Decodes the controller's reports, in raw units. Pure. Of a report that is longer than
+  # documented, the documented part is read; shorter ones are `:malformed`; undocumented ports and
+  # opcodes are `:unknown`.
   alias Hal.RFlex.Protocol.Packet
 
   @type axis :: %{

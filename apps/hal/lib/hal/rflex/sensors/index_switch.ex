@@ -1,12 +1,11 @@
 defmodule Hal.RFlex.Sensors.IndexSwitch do
-  @moduledoc """
-  Reads the switch that some bases (B21r) close at one absolute heading, as a digital input. Pure.
-
-  It closes over a small angle: its first event records the heading, and a later one more than
-  0.01 rad away makes the larger of the two the home heading. Older drivers then count all
-  headings from there; here odometry does not jump, and the home heading is a reading of its own.
-  The robot does not turn to look for it.
-  """
+  @moduledoc false
+  # Reads the switch that some bases (B21r) close at one absolute heading, as a digital input. Pure.
+  #
+  # It closes over a small angle: its first event records the heading, and a later one more than
+  # 0.01 rad away makes the larger of the two the home heading. Older drivers then count all
+  # headings from there; here odometry does not jump, and the home heading is a reading of its own.
+  # The robot does not turn to look for it.
   alias Hal.Pose
 
   @apart 0.01

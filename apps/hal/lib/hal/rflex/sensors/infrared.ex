@@ -1,19 +1,18 @@
 defmodule Hal.RFlex.Sensors.Infrared do
-  @moduledoc """
-  Computes the ranges of the infrareds from their voltages (a byte each). Pure.
-
-  Two laws are in use, with constants that differ from sensor to sensor:
-
-    * `:metres` - range = a · V^b, in metres; a = 4000, b = -2 is an example
-    * `:millimetres` - range = (a · V)^b, in millimetres; a = 0.0005456, b = -2.086 is an example
-
-  Below the least range the sensor does not show how near something is: the range is 0. Above the
-  greatest, and at a voltage of 0, it is the greatest.
-
-  A report has the sensors in the order of their boards, a profile in that of its poses: `order`
-  gives for each pose the place in the report. The boards of a Magellan Pro's infrareds follow
-  another order than those of its sonars.
-  """
+  @moduledoc false
+  # Computes the ranges of the infrareds from their voltages (a byte each). Pure.
+  #
+  # Two laws are in use, with constants that differ from sensor to sensor:
+  #
+  #   * `:metres` - range = a · V^b, in metres; a = 4000, b = -2 is an example
+  #   * `:millimetres` - range = (a · V)^b, in millimetres; a = 0.0005456, b = -2.086 is an example
+  #
+  # Below the least range the sensor does not show how near something is: the range is 0. Above the
+  # greatest, and at a voltage of 0, it is the greatest.
+  #
+  # A report has the sensors in the order of their boards, a profile in that of its poses: `order`
+  # gives for each pose the place in the report. The boards of a Magellan Pro's infrareds follow
+  # another order than those of its sonars.
 
   @enforce_keys [:banks, :base, :order, :laws, :law, :least, :greatest]
   defstruct @enforce_keys

@@ -1,8 +1,7 @@
 defmodule Hal.RFlex.Sensors.Layout do
-  @moduledoc """
-  Works out which sensors a base has on which boards: from the options and, for what they leave out, from
-  what is usual for its body. Pure; the options are those of `Hal.RFlex.Options`.
-  """
+  @moduledoc false
+  # Works out which sensors a base has on which boards: from the options and, for what they leave out, from
+  # what is usual for its body. Pure; the options are those of `Hal.RFlex.Options`.
   alias Hal.{Options, Profile}
   alias Hal.RFlex.Conversions
   alias Hal.RFlex.Sensors.{Bumpers, Infrared}

@@ -1,11 +1,10 @@
 defmodule Hal.Visca.Queue.Sockets do
-  @moduledoc """
-  Tracks which commands occupy a camera's two sockets, as far as it has reported. Pure.
-
-  Answers get lost on a line, so this record may be wrong either way. `:unknown` stands for a
-  command that runs but is not known: when its socket is needed, it is cancelled unless a known
-  command is pointless.
-  """
+  @moduledoc false
+  # Tracks which commands occupy a camera's two sockets, as far as it has reported. Pure.
+  #
+  # Answers get lost on a line, so this record may be wrong either way. `:unknown` stands for a
+  # command that runs but is not known: when its socket is needed, it is cancelled unless a known
+  # command is pointless.
   alias Hal.Visca.{Command, CommandClass}
 
   # The longest move at full speed takes 2.5 s, zoom about as much; switching on takes longer.

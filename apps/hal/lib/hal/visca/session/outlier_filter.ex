@@ -1,11 +1,10 @@
 defmodule Hal.Visca.Session.OutlierFilter do
-  @moduledoc """
-  Rejects positions that a camera's head cannot have reached. Pure; the camera's units.
-
-  On a line without checksums a single wrong bit turns one position into another. The head turns
-  at 80 degrees/s at most (tilt: 50; other models: `Hal.Visca.Model`), so a position further away
-  than it can have moved since the last one is doubted, until the next one is about the same.
-  """
+  @moduledoc false
+  # Rejects positions that a camera's head cannot have reached. Pure; the camera's units.
+  #
+  # On a line without checksums a single wrong bit turns one position into another. The head turns
+  # at 80 degrees/s at most (tilt: 50; other models: `Hal.Visca.Model`), so a position further away
+  # than it can have moved since the last one is doubted, until the next one is about the same.
   alias Hal.Visca.Model
 
   @enforce_keys [:pan, :tilt]

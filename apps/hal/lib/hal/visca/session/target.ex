@@ -1,11 +1,10 @@
 defmodule Hal.Visca.Session.Target do
-  @moduledoc """
-  Decides where a camera's head should look, and whether to send the command (again). Pure; the camera's
-  units.
-
-  A new target is due at once. A target that was sent is due again when the head has stood still
-  for 0.5 s, more than a degree away from it, and 1 s has passed since it was last sent.
-  """
+  @moduledoc false
+  # Decides where a camera's head should look, and whether to send the command (again). Pure; the camera's
+  # units.
+  #
+  # A new target is due at once. A target that was sent is due again when the head has stood still
+  # for 0.5 s, more than a degree away from it, and 1 s has passed since it was last sent.
   alias Hal.Visca.Model
 
   @still_ms 500

@@ -1,8 +1,7 @@
 defmodule Mesh.Distribution.Access.Networks do
-  @moduledoc """
-  Reads IPv4 networks as an operator writes them, `"10.0.0.20"` or `"10.0.1.0/24"`, and decides whether an address is in
-  one. Pure.
-  """
+  @moduledoc false
+  # Reads IPv4 networks as an operator writes them, `"10.0.0.20"` or `"10.0.1.0/24"`, and decides whether an address is in
+  # one. Pure.
   import Bitwise
 
   @typedoc "The first bits of an address that decide, as a number, and the mask that takes them from an address."

@@ -1,9 +1,8 @@
 defmodule Mesh.Distribution.ConnectionLog.Address do
-  @moduledoc """
-  Finds who is at the other end of the connection that this process serves. The socket belongs to this process, or with
-  TLS to one that is linked to it through a few others of the same connection. Named processes belong to all connections
-  and are skipped.
-  """
+  @moduledoc false
+  # Finds who is at the other end of the connection that this process serves. The socket belongs to this process, or with
+  # TLS to one that is linked to it through a few others of the same connection. Named processes belong to all connections
+  # and are skipped.
   @hops 3
 
   @doc "The address and the port of the other side, as `10.0.0.13:53312`; `nil` if it is gone or not known."

@@ -1,8 +1,7 @@
 defmodule Mesh.Distribution.ConnectionLog.Peer do
-  @moduledoc """
-  Finds the peer of a TLS handshake, for the log: the name in its certificate, and its address, which is gone once it has
-  hung up. Erlang calls `verify/3` in the process of the connection, which keeps both until it ends.
-  """
+  @moduledoc false
+  # Finds the peer of a TLS handshake, for the log: the name in its certificate, and its address, which is gone once it has
+  # hung up. Erlang calls `verify/3` in the process of the connection, which keeps both until it ends.
   alias Mesh.Distribution.ConnectionLog.Address
 
   @doc """

@@ -1,7 +1,6 @@
 defmodule Mesh.Distribution.ConnectionLog.Reasons do
-  @moduledoc """
-  Interprets Erlang's reports of refused connections. Pure.
-  """
+  @moduledoc false
+  # Interprets Erlang's reports of refused connections. Pure.
 
   @fatal 2
   # Alerts of TLS (RFC 8446, section 6) that a refused node gets or sends.

@@ -1,12 +1,11 @@
 defmodule Mesh.Distribution.Epmd.Peers do
-  @moduledoc """
-  Computes the port of a name, and the addresses of the nodes of a list. Pure.
-
-  Robots with the usual names have a port each, so that those on one machine do not collide:
-  `mag1` to `mag100` 9101 to 9200, `min1` to `min100` 9201 to 9300, `world` 9301, `base` 9302,
-  `demo`
-  9303. Other names share 9400 to 9999.
-  """
+  @moduledoc false
+  # Computes the port of a name, and the addresses of the nodes of a list. Pure.
+  #
+  # Robots with the usual names have a port each, so that those on one machine do not collide:
+  # `mag1` to `mag100` 9101 to 9200, `min1` to `min100` 9201 to 9300, `world` 9301, `base` 9302,
+  # `demo`
+  # 9303. Other names share 9400 to 9999.
 
   @type peer :: {node :: String.t(), :inet.ip_address(), :inet.port_number()}
 

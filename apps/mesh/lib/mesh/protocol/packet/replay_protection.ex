@@ -1,21 +1,20 @@
 defmodule Mesh.Protocol.Packet.ReplayProtection do
-  @moduledoc """
-  Decides which datagrams are believed: a signature proves that a datagram was made by the fleet,
-  this module that it was made now, and is heard for the first time. Pure.
-
-  Every node draws a random session number at its start. A listener accepts a session only by an
-  answer to a challenge of its own (`Mesh.Protocol.Challenge`), which no recording can contain,
-  and which tells it how the clock of that session stands. From then on each datagram of the
-  session must be fresh by that clock (`Mesh.Protocol.ClockOffset`): one that was recorded and
-  never received is worthless 2 s later. And each counts once
-  (`Mesh.Protocol.Packet.SequenceWindow`). If nothing of a session was believed for longer than
-  datagrams are fresh, its window begins anew: whatever it keeps out is stale by now, and a number
-  far too high, which somebody with the fleet's key invented, does not shut the session out for
-  good.
-
-  A session that was followed by another is never accepted again. While a node is heard, no other
-  session of its name is admitted, so two nodes of the same name do not take turns.
-  """
+  @moduledoc false
+  # Decides which datagrams are believed: a signature proves that a datagram was made by the fleet,
+  # this module that it was made now, and is heard for the first time. Pure.
+  #
+  # Every node draws a random session number at its start. A listener accepts a session only by an
+  # answer to a challenge of its own (`Mesh.Protocol.Challenge`), which no recording can contain,
+  # and which tells it how the clock of that session stands. From then on each datagram of the
+  # session must be fresh by that clock (`Mesh.Protocol.ClockOffset`): one that was recorded and
+  # never received is worthless 2 s later. And each counts once
+  # (`Mesh.Protocol.Packet.SequenceWindow`). If nothing of a session was believed for longer than
+  # datagrams are fresh, its window begins anew: whatever it keeps out is stale by now, and a number
+  # far too high, which somebody with the fleet's key invented, does not shut the session out for
+  # good.
+  #
+  # A session that was followed by another is never accepted again. While a node is heard, no other
+  # session of its name is admitted, so two nodes of the same name do not take turns.
   alias Mesh.Protocol.{Challenge, ClockOffset}
   alias Mesh.Protocol.Packet.SequenceWindow
 

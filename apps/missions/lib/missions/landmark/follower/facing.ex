@@ -1,9 +1,8 @@
 defmodule Missions.Landmark.Follower.Facing do
-  @moduledoc """
-  Turns a follower that has been unsure of its place in its slot for 4 s to what it can make sure by: the leader, the landmark
-  and the robots ahead, one after the other, as far as no wall hides them. It stays turned, because it would not be in place
-  while it turned back. Pure.
-  """
+  @moduledoc false
+  # Turns a follower that has been unsure of its place in its slot for 4 s to what it can make sure by: the leader, the landmark
+  # and the robots ahead, one after the other, as far as no wall hides them. It stays turned, because it would not be in place
+  # while it turned back. Pure.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.SlotPoses

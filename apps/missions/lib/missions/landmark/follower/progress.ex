@@ -1,11 +1,10 @@
 defmodule Missions.Landmark.Follower.Progress do
-  @moduledoc """
-  Decides whether a follower that is short of its slot gets on, or is blocked, and by what. Pure.
-
-  A slot is blocked if something unknown has stood in it for 2 s, or if no way has led nearer for 8 s. Wherever it is, a
-  robot that has come no nearer to one slot for 15 s makes no progress, whatever shape the slot belongs to, nor does one
-  whose wheels have stood for so long, whatever its pose is corrected by.
-  """
+  @moduledoc false
+  # Decides whether a follower that is short of its slot gets on, or is blocked, and by what. Pure.
+  #
+  # A slot is blocked if something unknown has stood in it for 2 s, or if no way has led nearer for 8 s. Wherever it is, a
+  # robot that has come no nearer to one slot for 15 s makes no progress, whatever shape the slot belongs to, nor does one
+  # whose wheels have stood for so long, whatever its pose is corrected by.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, SlotPoses}

@@ -1,9 +1,8 @@
 defmodule Missions.Landmark.Leader.Announcement do
-  @moduledoc """
-  Decides what a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
-  supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
-  milliradians.
-  """
+  @moduledoc false
+  # Decides what a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
+  # supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
+  # milliradians.
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Shape}
   alias Missions.Landmark.Reference

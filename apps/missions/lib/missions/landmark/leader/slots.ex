@@ -1,7 +1,6 @@
 defmodule Missions.Landmark.Leader.Slots do
-  @moduledoc """
-  Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
-  """
+  @moduledoc false
+  # Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Merge, Rounds, Shape}
   alias Swarm.Formation.{Assignment, Chain}

@@ -1,8 +1,7 @@
 defmodule Missions.Landmark.Lookout.Legs do
-  @moduledoc """
-  Decides to which place a robot goes next on its search from room to room (`Missions.Landmark.Lookout`), and to which it leaves
-  others. Pure; metres, in the frame of the map.
-  """
+  @moduledoc false
+  # Decides to which place a robot goes next on its search from room to room (`Missions.Landmark.Lookout`), and to which it leaves
+  # others. Pure; metres, in the frame of the map.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Coverage

@@ -1,8 +1,7 @@
 defmodule Missions.Landmark.Transitions.Entry do
-  @moduledoc """
-  Decides what a robot forgets and takes up when it enters a phase of `Missions.Landmark.Transitions`.
-  Pure.
-  """
+  @moduledoc false
+  # Decides what a robot forgets and takes up when it enters a phase of `Missions.Landmark.Transitions`.
+  # Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Follower, Leader, Transitions}
   alias Swarm.Agreement.Round

@@ -1,11 +1,10 @@
 defmodule Robot.Behaviour.Avoid.Brake do
-  @moduledoc """
-  Checks the speed that avoidance has found, before caution, arbiter and gate (docs/architecture.md, section 3): if the robot drove on
-  for a moment and then braked, would it come too near to another robot that does the same? If so, it drives more slowly, or not at all. The turn rate is not limited. Pure.
-
-  The wheels cannot follow a wished velocity immediately, so the real path differs from the
-  planned one; this check takes that into account.
-  """
+  @moduledoc false
+  # Checks the speed that avoidance has found, before caution, arbiter and gate (docs/architecture.md, section 3): if the robot drove on
+  # for a moment and then braked, would it come too near to another robot that does the same? If so, it drives more slowly, or not at all. The turn rate is not limited. Pure.
+  #
+  # The wheels cannot follow a wished velocity immediately, so the real path differs from the
+  # planned one; this check takes that into account.
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Behaviour.Avoid.Neighbours
 

@@ -1,8 +1,7 @@
 defmodule Robot.Behaviour.Avoid.Clearance do
-  @moduledoc """
-  Expresses the distances that a robot keeps from robots and obstacles, as half-planes of velocities for
-  `Robot.Navigation.Orca`. Pure.
-  """
+  @moduledoc false
+  # Expresses the distances that a robot keeps from robots and obstacles, as half-planes of velocities for
+  # `Robot.Navigation.Orca`. Pure.
   alias Hal.Pose
   alias Robot.Navigation.Orca
   alias Robot.Percept

@@ -1,10 +1,9 @@
 defmodule Robot.Behaviour.Avoid.Echoes do
-  @moduledoc """
-  Remembers where a robot's sonars have seen something lately, and since when: what has stayed where it is, is no robot
-  that drives. Pure.
-
-  A place is forgotten after 5 s, or as soon as a sonar sees through it.
-  """
+  @moduledoc false
+  # Remembers where a robot's sonars have seen something lately, and since when: what has stayed where it is, is no robot
+  # that drives. Pure.
+  #
+  # A place is forgotten after 5 s, or as soon as a sonar sees through it.
   alias Hal.Pose
   alias Robot.Percept
   alias Robot.Safety.Reflex

@@ -1,11 +1,10 @@
 defmodule Robot.Behaviour.Avoid.GiveWay do
-  @moduledoc """
-  Gives way: a robot that stands may block another's path. If another robot that does not hold its
-  place stays close for some seconds, this one steps aside for a moment. Pure.
-
-  The threshold is meant to be below the spacing of a formation, so that neighbours in a formation
-  do not make each other step aside.
-  """
+  @moduledoc false
+  # Gives way: a robot that stands may block another's path. If another robot that does not hold its
+  # place stays close for some seconds, this one steps aside for a moment. Pure.
+  #
+  # The threshold is meant to be below the spacing of a formation, so that neighbours in a formation
+  # do not make each other step aside.
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Neighbours
 

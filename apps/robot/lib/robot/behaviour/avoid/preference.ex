@@ -1,9 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Preference do
-  @moduledoc """
-  Computes the velocity that a robot prefers, before `Robot.Navigation.Orca` limits it by the other bodies: along its
-  route, to the right of oncoming robots, and away from what is close. Pure; velocities in m/s, points in metres, in the
-  frame of the percept's pose.
-  """
+  @moduledoc false
+  # Computes the velocity that a robot prefers, before `Robot.Navigation.Orca` limits it by the other bodies: along its
+  # route, to the right of oncoming robots, and away from what is close. Pure; velocities in m/s, points in metres, in the
+  # frame of the percept's pose.
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Clearance
   alias Robot.Percept

@@ -1,9 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Progress do
-  @moduledoc """
-  Detects that a robot makes no progress to its goal, and then turns it off its route for a while.
-  The angle and the duration follow from its name and the number of attempts, so that two robots
-  that block each other are unlikely to mirror each other for long. Pure.
-  """
+  @moduledoc false
+  # Detects that a robot makes no progress to its goal, and then turns it off its route for a while.
+  # The angle and the duration follow from its name and the number of attempts, so that two robots
+  # that block each other are unlikely to mirror each other for long. Pure.
 
   @enforce_keys [:best, :since_ms]
   defstruct @enforce_keys ++ [seen_ms: 0, hindered?: false, tries: 0, until_ms: nil, angle: 0.0]

@@ -1,9 +1,8 @@
 defmodule Robot.Behaviour.Avoid.Route do
-  @moduledoc """
-  Chooses a route to a goal around standing obstacles, and keeps to it: a route with wide
-  clearance is preferred unless it is much longer, and the previous route is kept unless another
-  is clearly shorter. Otherwise a robot between two equally good routes would oscillate. Pure.
-  """
+  @moduledoc false
+  # Chooses a route to a goal around standing obstacles, and keeps to it: a route with wide
+  # clearance is preferred unless it is much longer, and the previous route is kept unless another
+  # is clearly shorter. Otherwise a robot between two equally good routes would oscillate. Pure.
   alias Hal.Pose
   alias Robot.Percept
   alias Robot.Navigation.{Grid, PathPlanner}

@@ -1,12 +1,11 @@
 defmodule Robot.Control.Pilot.Journal do
-  @moduledoc """
-  Describes what a pilot publishes about itself: on the board, in events and in the trace.
-
-  The board's entry `:mission` contains the mission, its phase and its claim, the time of the
-  percept from which the mission made that claim, and the options with which it was started. The entry `:asking`
-  exists while a callback of the mission runs, so that `Robot.Safety.LivenessMonitor` detects one
-  that does not return.
-  """
+  @moduledoc false
+  # Describes what a pilot publishes about itself: on the board, in events and in the trace.
+  #
+  # The board's entry `:mission` contains the mission, its phase and its claim, the time of the
+  # percept from which the mission made that claim, and the options with which it was started. The entry `:asking`
+  # exists while a callback of the mission runs, so that `Robot.Safety.LivenessMonitor` detects one
+  # that does not return.
   alias Hal.Event
   alias Robot.Board
   alias Robot.Trace

@@ -1,9 +1,8 @@
 defmodule Robot.Localiser.Belief.Marks do
-  @moduledoc """
-  Keeps the marks of a belief: objects at reported places, each with the offset from there as two states
-  of the filter. Adds a mark when it is first met, keeps up with what is reported of it, and drops
-  the one that was used least recently when there are too many. Pure.
-  """
+  @moduledoc false
+  # Keeps the marks of a belief: objects at reported places, each with the offset from there as two states
+  # of the filter. Adds a mark when it is first met, keeps up with what is reported of it, and drops
+  # the one that was used least recently when there are too many. Pure.
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Covariance}
 

@@ -1,11 +1,10 @@
 defmodule Robot.Localiser.Walls.Facing do
-  @moduledoc """
-  Computes what a sonar should hear by a floor plan: the wall that it faces squarely, because any other throws the echo elsewhere.
-  Pure; metres and radians, in the frame of the map.
-
-  A ray along the axis of the sonar finds the wall. Its distance, and the direction in which it faces, follow from the clearances
-  before it (`Robot.Navigation.Grid`), which are finer than the cells. More rays look for what else is in the cone and nearer.
-  """
+  @moduledoc false
+  # Computes what a sonar should hear by a floor plan: the wall that it faces squarely, because any other throws the echo elsewhere.
+  # Pure; metres and radians, in the frame of the map.
+  #
+  # A ray along the axis of the sonar finds the wall. Its distance, and the direction in which it faces, follow from the clearances
+  # before it (`Robot.Navigation.Grid`), which are finer than the cells. More rays look for what else is in the cone and nearer.
   alias Hal.Pose
   alias Robot.Navigation.Grid
 

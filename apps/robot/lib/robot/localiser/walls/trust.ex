@@ -1,13 +1,12 @@
 defmodule Robot.Localiser.Walls.Trust do
-  @moduledoc """
-  Decides whether a floor plan is that of the building in which the robot is, at the place where it believes to be, by how well
-  its readings agree with the plan. Pure.
-
-  Each reading is evidence: the logarithm of how much likelier it is if the plan is right than if it has nothing to do with
-  it. What counts is the sum over the last readings as a share of what it would be if each of them agreed exactly, so that a
-  robot that is unsure of its place, and can expect almost any range, decides nothing. A plan is trusted until readings
-  contradict it; then it takes more of them to trust it again.
-  """
+  @moduledoc false
+  # Decides whether a floor plan is that of the building in which the robot is, at the place where it believes to be, by how well
+  # its readings agree with the plan. Pure.
+  #
+  # Each reading is evidence: the logarithm of how much likelier it is if the plan is right than if it has nothing to do with
+  # it. What counts is the sum over the last readings as a share of what it would be if each of them agreed exactly, so that a
+  # robot that is unsure of its place, and can expect almost any range, decides nothing. A plan is trusted until readings
+  # contradict it; then it takes more of them to trust it again.
 
   # A reading that has nothing to do with the plan may have any range (per metre), and so may this share of all others: of
   # people, of furniture, of echoes by two walls.

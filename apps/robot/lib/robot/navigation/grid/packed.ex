@@ -1,9 +1,8 @@
 defmodule Robot.Navigation.Grid.Packed do
-  @moduledoc """
-  Packs the walls of a grid into a small term, for messages and recordings: only where walls are. Pure.
-
-  A grid is the same after it was packed and unpacked; its clearances are computed again.
-  """
+  @moduledoc false
+  # Packs the walls of a grid into a small term, for messages and recordings: only where walls are. Pure.
+  #
+  # A grid is the same after it was packed and unpacked; its clearances are computed again.
   alias Robot.Navigation.Grid
 
   @most 1_000_000

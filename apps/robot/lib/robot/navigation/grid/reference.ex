@@ -1,8 +1,7 @@
 defmodule Robot.Navigation.Grid.Reference do
-  @moduledoc """
-  Defines what the kernels of `Robot.Navigation.Grid` compute, in Elixir: the definition, for small grids and for builds without C.
-  The same bytes and the same ways. Pure.
-  """
+  @moduledoc false
+  # Defines what the kernels of `Robot.Navigation.Grid` compute, in Elixir: the definition, for small grids and for builds without C.
+  # The same bytes and the same ways. Pure.
 
   @unit 0.02
   @most 255

@@ -1,8 +1,7 @@
 defmodule Robot.Navigation.MapFile.Adam7 do
-  @moduledoc """
-  Puts interlaced PNG pictures together: seven smaller ones, of every eighth pixel and then of those between, become
-  one. Pure.
-  """
+  @moduledoc false
+  # Puts interlaced PNG pictures together: seven smaller ones, of every eighth pixel and then of those between, become
+  # one. Pure.
 
   # The first column and row of each, and how far the next are.
   @passes [{0, 0, 8, 8}, {4, 0, 8, 8}, {0, 4, 4, 8}, {2, 0, 4, 4}, {0, 2, 2, 4}, {1, 0, 2, 2}] ++

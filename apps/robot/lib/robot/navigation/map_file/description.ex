@@ -1,14 +1,13 @@
 defmodule Robot.Navigation.MapFile.Description do
-  @moduledoc """
-  Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
-  (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
-  corner of the picture lies), and optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
-  Read as data: no other YAML is understood, other keys are ignored. Pure.
-
-  A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
-  surely free, less than `free_thresh`, is wall; so is 205, which map_server writes for what it does
-  not know.
-  """
+  @moduledoc false
+  # Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
+  # (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
+  # corner of the picture lies), and optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
+  # Read as data: no other YAML is understood, other keys are ignored. Pure.
+  #
+  # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
+  # surely free, less than `free_thresh`, is wall; so is 205, which map_server writes for what it does
+  # not know.
 
   @enforce_keys [:image, :resolution, :origin, :shades]
   defstruct @enforce_keys

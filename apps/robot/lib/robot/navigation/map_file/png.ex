@@ -1,8 +1,7 @@
 defmodule Robot.Navigation.MapFile.Png do
-  @moduledoc """
-  Reads PNG pictures: grey of 1, 2, 4, 8 or 16 bits, grey with alpha, RGB, RGBA of 8 or 16 bits a channel, and palettes;
-  also interlaced ones (`Robot.Navigation.MapFile.Adam7`). Colours become greys, what is transparent white. Pure.
-  """
+  @moduledoc false
+  # Reads PNG pictures: grey of 1, 2, 4, 8 or 16 bits, grey with alpha, RGB, RGBA of 8 or 16 bits a channel, and palettes;
+  # also interlaced ones (`Robot.Navigation.MapFile.Adam7`). Colours become greys, what is transparent white. Pure.
   alias Robot.Navigation.MapFile.{Adam7, Picture}
 
   @damaged {:error, "the picture is damaged"}

@@ -1,8 +1,7 @@
 defmodule Robot.Navigation.OccupancyGrid.Cones do
-  @moduledoc """
-  Turns the readings of a ring of sonars into what the kernels of `Robot.Navigation.OccupancyGrid` take: for each a cone, in
-  cells of 10 cm. Pure.
-  """
+  @moduledoc false
+  # Turns the readings of a ring of sonars into what the kernels of `Robot.Navigation.OccupancyGrid` take: for each a cone, in
+  # cells of 10 cm. Pure.
   alias Hal.Pose
   alias Robot.Navigation.Grid
   alias Robot.Percept

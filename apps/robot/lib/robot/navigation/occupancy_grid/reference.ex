@@ -1,12 +1,11 @@
 defmodule Robot.Navigation.OccupancyGrid.Reference do
-  @moduledoc """
-  Defines what the kernels of `Robot.Navigation.OccupancyGrid` compute, in Elixir: the definition, for small grids and for builds
-  without C. The same bytes. Pure.
-
-  The evidence of a cell is a whole number from -40 (free) to 60 (wall), 0 if nothing is known: log odds in steps of
-  about 0.1. An echo adds up to 10 to the cells of its arc, most on the axis of its cone, and takes 4 from those before it
-  (Moravec and Elfes 1985). Cells and readings are in cells from the lower left corner.
-  """
+  @moduledoc false
+  # Defines what the kernels of `Robot.Navigation.OccupancyGrid` compute, in Elixir: the definition, for small grids and for builds
+  # without C. The same bytes. Pure.
+  #
+  # The evidence of a cell is a whole number from -40 (free) to 60 (wall), 0 if nothing is known: log odds in steps of
+  # about 0.1. An echo adds up to 10 to the cells of its arc, most on the axis of its cone, and takes 4 from those before it
+  # (Moravec and Elfes 1985). Cells and readings are in cells from the lower left corner.
 
   @hit 10
   @miss -4

@@ -1,9 +1,8 @@
 defmodule Robot.Safety.Reflex.Limits do
-  @moduledoc """
-  Applies the limits of the robot's speeds, its surroundings and its fence to a wish that may be
-  carried out: those from `:speed` to `:bumper` in the table of `Robot.Safety.Reflex`, one
-  after the other. Pure.
-  """
+  @moduledoc false
+  # Applies the limits of the robot's speeds, its surroundings and its fence to a wish that may be
+  # carried out: those from `:speed` to `:bumper` in the table of `Robot.Safety.Reflex`, one
+  # after the other. Pure.
   alias Hal.Drive.SlewLimiter
   alias Hal.Twist
   alias Robot.Safety.Reflex

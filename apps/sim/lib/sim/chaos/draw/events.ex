@@ -1,8 +1,7 @@
 defmodule Sim.Chaos.Draw.Events do
-  @moduledoc """
-  Draws what happens during a run: moves of the landmark, kills, cuts of the radio. Pure; times in
-  whole seconds.
-  """
+  @moduledoc false
+  # Draws what happens during a run: moves of the landmark, kills, cuts of the radio. Pure; times in
+  # whole seconds.
   alias Sim.Chaos.Random
 
   # So that most fleets have time to form again before the run ends.

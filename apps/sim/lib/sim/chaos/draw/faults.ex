@@ -1,9 +1,8 @@
 defmodule Sim.Chaos.Draw.Faults do
-  @moduledoc """
-  Draws the script of a run (`Sim.Trial.Event`): robots that freeze, or see or hear nothing for a while,
-  a radio that becomes worse for a while, people who press the emergency stop and start again, or ask
-  for another shape. Pure; times in whole seconds.
-  """
+  @moduledoc false
+  # Draws the script of a run (`Sim.Trial.Event`): robots that freeze, or see or hear nothing for a while,
+  # a radio that becomes worse for a while, people who press the emergency stop and start again, or ask
+  # for another shape. Pure; times in whole seconds.
   alias Sim.Chaos.Draw.Events
   alias Sim.Chaos.Random
 

@@ -1,13 +1,12 @@
 defmodule Sim.Chaos.Invariants.Withdrawals do
-  @moduledoc """
-  Notes when claims of `formed` end, so that none is called false for the time that it takes to
-  withdraw it. Pure; fed every 100 ms.
-
-  `Sim.Trial.Claims` looks again 5 s after a claim was made. A leader withdraws a claim when not all have
-  been in place for 0.5 s (docs/architecture.md, table of times), and hears of it by a heartbeat, which
-  comes every 0.2 s and may be under way for a while. A claim that is withdrawn within that time after
-  it was looked at again was no longer true then, and known not to be.
-  """
+  @moduledoc false
+  # Notes when claims of `formed` end, so that none is called false for the time that it takes to
+  # withdraw it. Pure; fed every 100 ms.
+  #
+  # `Sim.Trial.Claims` looks again 5 s after a claim was made. A leader withdraws a claim when not all have
+  # been in place for 0.5 s (docs/architecture.md, table of times), and hears of it by a heartbeat, which
+  # comes every 0.2 s and may be under way for a while. A claim that is withdrawn within that time after
+  # it was looked at again was no longer true then, and known not to be.
 
   @later_ms 5_000
   @unformed_ms 500

@@ -1,12 +1,11 @@
 defmodule Sim.Emulator.RFlexController.CommandHandler do
-  @moduledoc """
-  Carries out the frames that a controller receives (fact sheet rFLEX, sections 3 to 9). Pure.
-  Unknown orders are only counted.
-
-  Where the sheet leaves it open: setting the defaults stops both axes with their accelerations;
-  periods of reports of motion and inputs are in microseconds, those of infrared in milliseconds;
-  the shortest is 10 ms.
-  """
+  @moduledoc false
+  # Carries out the frames that a controller receives (fact sheet rFLEX, sections 3 to 9). Pure.
+  # Unknown orders are only counted.
+  #
+  # Where the sheet leaves it open: setting the defaults stops both axes with their accelerations;
+  # periods of reports of motion and inputs are in microseconds, those of infrared in milliseconds;
+  # the shortest is 10 ms.
   import Sim.Emulator.RFlexController.State, only: [count: 3, stamp: 2, tell: 2]
   alias Sim.Emulator.RFlexController
   alias Sim.Emulator.RFlexController.{Frame, Motors, Sonars}

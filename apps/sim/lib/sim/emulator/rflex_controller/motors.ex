@@ -1,13 +1,12 @@
 defmodule Sim.Emulator.RFlexController.Motors do
-  @moduledoc """
-  Emulates both axes of the controller, forward and turn: commanded speeds with their accelerations, the brake, the stop
-  when commands are missing, and the counters. Pure; counts are in the controller's units, times in milliseconds.
-
-  Where the sheet leaves it open: an acceleration of 0 keeps the previous one; a set brake stops
-  the wheels at once, and no speed is accepted while it is set; an axis gets no faster than a base
-  of that size can, 2.5 m/s and 5 rad/s, whatever the command. (A damaged command whose checksum
-  happens to fit may ask for 20 m/s at 100 m/s2; an axis that obeyed would then brake for 20 s.)
-  """
+  @moduledoc false
+  # Emulates both axes of the controller, forward and turn: commanded speeds with their accelerations, the brake, the stop
+  # when commands are missing, and the counters. Pure; counts are in the controller's units, times in milliseconds.
+  #
+  # Where the sheet leaves it open: an acceleration of 0 keeps the previous one; a set brake stops
+  # the wheels at once, and no speed is accepted while it is set; an axis gets no faster than a base
+  # of that size can, 2.5 m/s and 5 rad/s, whatever the command. (A damaged command whose checksum
+  # happens to fit may ask for 20 m/s at 100 m/s2; an axis that obeyed would then brake for 20 s.)
   import Bitwise
   alias Hal.{Odometry, Pose, Twist}
 

@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.RFlexController.Report do
-  @moduledoc """
-  Encodes the data of a controller's reports (fact sheet rFLEX, sections 4 to 9). Pure; all numbers big-endian, `at` is
-  the controller's time stamp.
-  """
+  @moduledoc false
+  # Encodes the data of a controller's reports (fact sheet rFLEX, sections 4 to 9). Pure; all numbers big-endian, `at` is
+  # the controller's time stamp.
 
   @type data :: {port :: byte(), opcode :: byte(), binary()}
 

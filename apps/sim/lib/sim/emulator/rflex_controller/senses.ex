@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.RFlexController.Senses do
-  @moduledoc """
-  Converts what the body senses to the numbers of a controller's boards: bumpers as digital
-  inputs, infrared as bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
-  """
+  @moduledoc false
+  # Converts what the body senses to the numbers of a controller's boards: bumpers as digital
+  # inputs, infrared as bytes of a converter (fact sheet rFLEX, sections 6, 7 and 12). Pure.
 
   @doc """
   The states of the digital inputs by address, for pressed segments counted counter-clockwise from

@@ -1,11 +1,10 @@
 defmodule Sim.Emulator.RFlexController.Sonars do
-  @moduledoc """
-  Fires the sonars one after the other: each listens for the echo delay and rests for the ping
-  delay, and each sweep is followed by the set delay (fact sheet rFLEX, section 5). Pure; times in
-  microseconds.
-
-  The echo of a sonar is what the body sensed last when its listening ends.
-  """
+  @moduledoc false
+  # Fires the sonars one after the other: each listens for the echo delay and rests for the ping
+  # delay, and each sweep is followed by the set delay (fact sheet rFLEX, section 5). Pure; times in
+  # microseconds.
+  #
+  # The echo of a sonar is what the body sensed last when its listening ends.
 
   # Sound travels at 343 m/s, there and back.
   @metre_per_us 343 / 2 / 1.0e6

@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.RFlexController.State do
-  @moduledoc """
-  Holds the state of a controller. Pure. Times are milliseconds; `counts` counts what arrived: good frames, bad frame
-  starts, unknown or lost orders, and turns with a forbidden byte 1B.
-  """
+  @moduledoc false
+  # Holds the state of a controller. Pure. Times are milliseconds; `counts` counts what arrived: good frames, bad frame
+  # starts, unknown or lost orders, and turns with a forbidden byte 1B.
   alias Sim.Emulator.RFlexController
   alias Sim.Emulator.RFlexController.{Frame, Motors, Senses}
 

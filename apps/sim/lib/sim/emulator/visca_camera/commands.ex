@@ -1,8 +1,7 @@
 defmodule Sim.Emulator.ViscaCamera.Commands do
-  @moduledoc """
-  Carries out the commands of a camera (fact sheet VISCA, section 4). Pure. It checks first whether a command is valid,
-  then whether a socket is free, then whether the command can be carried out now.
-  """
+  @moduledoc false
+  # Carries out the commands of a camera (fact sheet VISCA, section 4). Pure. It checks first whether a command is valid,
+  # then whether a socket is free, then whether the command can be carried out now.
   alias Sim.Emulator.ViscaCamera
   alias Sim.Emulator.ViscaCamera.{Head, Packet}
 

@@ -1,11 +1,10 @@
 defmodule Sim.Emulator.ViscaCamera.Head do
-  @moduledoc """
-  Moves the parts of the camera: pan and tilt with the rates of their speed numbers, and zoom (fact sheet VISCA, section
-  5). Pure; positions in the camera's units (pan to the right, tilt up, zoom to tele positive), times in milliseconds.
-
-  An axis goes to a position or drives until it is stopped or at its end. Pan and tilt move
-  independently; a path may have several corners.
-  """
+  @moduledoc false
+  # Moves the parts of the camera: pan and tilt with the rates of their speed numbers, and zoom (fact sheet VISCA, section
+  # 5). Pure; positions in the camera's units (pan to the right, tilt up, zoom to tele positive), times in milliseconds.
+  #
+  # An axis goes to a position or drives until it is stopped or at its end. Pan and tilt move
+  # independently; a path may have several corners.
 
   @ends {880, 300}
   # Units a second for speed 1: 3.33 degrees of 8.8 units, 2.5 degrees of 12.

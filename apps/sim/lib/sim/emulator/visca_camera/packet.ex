@@ -1,9 +1,8 @@
 defmodule Sim.Emulator.ViscaCamera.Packet do
-  @moduledoc """
-  Packets as the camera reads and writes them (fact sheet VISCA, sections 2 to 4). Pure.
-
-  Numbers of 16 bits travel as four bytes of four bits each. The camera is the first of its chain.
-  """
+  @moduledoc false
+  # Packets as the camera reads and writes them (fact sheet VISCA, sections 2 to 4). Pure.
+  #
+  # Numbers of 16 bits travel as four bytes of four bits each. The camera is the first of its chain.
 
   # Header, 14 bytes and terminator.
   @longest 16

@@ -1,9 +1,8 @@
 defmodule Sim.Emulator.ViscaCamera.State do
-  @moduledoc """
-  Holds the state of a camera: its head, its two sockets, and its pending answers. Pure; times in milliseconds.
-
-  A socket is free (`nil`) or holds what its command waits for: `:way`, `:zoom`, `:drive` or `{:until, at_ms}`.
-  """
+  @moduledoc false
+  # Holds the state of a camera: its head, its two sockets, and its pending answers. Pure; times in milliseconds.
+  #
+  # A socket is free (`nil`) or holds what its command waits for: `:way`, `:zoom`, `:drive` or `{:until, at_ms}`.
   alias Sim.Noise
   alias Sim.Emulator.ViscaCamera.{Head, Packet}
 

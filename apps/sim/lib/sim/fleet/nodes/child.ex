@@ -1,8 +1,7 @@
 defmodule Sim.Fleet.Nodes.Child do
-  @moduledoc """
-  Starts a node: its process of the operating system behind a port (`Vm.open/2`). It lives no longer than we do, even
-  frozen.
-  """
+  @moduledoc false
+  # Starts a node: its process of the operating system behind a port (`Vm.open/2`). It lives no longer than we do, even
+  # frozen.
   alias Sim.Fleet.Nodes
   alias Sim.Fleet.Nodes.Command
 

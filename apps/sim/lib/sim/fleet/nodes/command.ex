@@ -1,7 +1,6 @@
 defmodule Sim.Fleet.Nodes.Command do
-  @moduledoc """
-  Writes the commands that start a node, and those by which a person reaches it, as text. Pure.
-  """
+  @moduledoc false
+  # Writes the commands that start a node, and those by which a person reaches it, as text. Pure.
 
   @doc """
   The arguments of `erl` for a node, with the carrier of robots (`Mesh.Distribution.Access`) and the formations that

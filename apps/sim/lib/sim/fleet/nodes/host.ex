@@ -1,13 +1,12 @@
 defmodule Sim.Fleet.Nodes.Host do
-  @moduledoc """
-  Makes this process of the operating system the node that starts others, on the loopback
-  interface, with a mesh of its own through which it hears them.
-
-  The secret of a run is random and in no file. Nodes get it on their standard input; for people
-  who want to attach, its cookie is in a folder that only this user can read, and that goes with
-  the run however it ends (`Sim.Fleet.Folder`). So it is neither on a command line nor in an
-  environment.
-  """
+  @moduledoc false
+  # Makes this process of the operating system the node that starts others, on the loopback
+  # interface, with a mesh of its own through which it hears them.
+  #
+  # The secret of a run is random and in no file. Nodes get it on their standard input; for people
+  # who want to attach, its cookie is in a folder that only this user can read, and that goes with
+  # the run however it ends (`Sim.Fleet.Folder`). So it is neither on a command line nor in an
+  # environment.
   alias Sim.Fleet.Folder
   alias Sim.Fleet.Nodes.PortMapper
   alias Mesh.{Options, Secret}

@@ -1,8 +1,7 @@
 defmodule Sim.Fleet.Nodes.PortMapper do
-  @moduledoc """
-  Provides Erlang's port mapper (epmd) for the duration of a run: if none answers, one is started, which ends with the
-  run in any case. An existing one is left alone, and so is ours while others use it.
-  """
+  @moduledoc false
+  # Provides Erlang's port mapper (epmd) for the duration of a run: if none answers, one is started, which ends with the
+  # run in any case. An existing one is left alone, and so is ours while others use it.
 
   @host "127.0.0.1"
   @address {127, 0, 0, 1}

@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Maps.Halls do
-  @moduledoc """
-  Draws the maps that grow with the fleet: each has free space around its centre for a column of the whole fleet at 1 m
-  spacing in any direction, and 3 m to drive around its end. Pure.
-  """
+  @moduledoc false
+  # Draws the maps that grow with the fleet: each has free space around its centre for a column of the whole fleet at 1 m
+  # spacing in any direction, and 3 m to drive around its end. Pure.
   alias Sim.Floorplan.{Drawing, Shape}
   alias Sim.Trig
 

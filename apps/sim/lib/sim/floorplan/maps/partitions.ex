@@ -1,8 +1,7 @@
 defmodule Sim.Floorplan.Maps.Partitions do
-  @moduledoc """
-  Draws a building of rooms and doors at random: a rectangle that is divided in two again and again (binary space partitioning),
-  with a door in each wall, so that all rooms are connected. Pure: the same seed gives the same building.
-  """
+  @moduledoc false
+  # Draws a building of rooms and doors at random: a rectangle that is divided in two again and again (binary space partitioning),
+  # with a door in each wall, so that all rooms are connected. Pure: the same seed gives the same building.
   alias Sim.Floorplan.{Drawing, Shape}
 
   # Metres: the building of a fleet of up to `@few`, its walls, the least side of a room, the widths of doors, how far a door

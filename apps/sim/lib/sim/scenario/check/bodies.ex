@@ -1,8 +1,7 @@
 defmodule Sim.Scenario.Check.Bodies do
-  @moduledoc """
-  Judges expectations about bodies by their true poses and speeds. Pure; answers are those of
-  `Sim.Scenario.Check`.
-  """
+  @moduledoc false
+  # Judges expectations about bodies by their true poses and speeds. Pure; answers are those of
+  # `Sim.Scenario.Check`.
   alias Hal.Pose
   alias Sim.Scenario.{Check, Expectation, View}
   alias Sim.Trial

@@ -1,8 +1,7 @@
 defmodule Sim.Scenario.Check.Fleet do
-  @moduledoc """
-  Judges expectations about the fleet: who leads, what robots claim, in which phase they are. Pure;
-  answers are those of `Sim.Scenario.Check`.
-  """
+  @moduledoc false
+  # Judges expectations about the fleet: who leads, what robots claim, in which phase they are. Pure;
+  # answers are those of `Sim.Scenario.Check`.
   alias Sim.Scenario.{Check, Expectation, View}
   alias Sim.Trial
   alias Sim.Trial.{Claims, RunLog}

@@ -1,8 +1,7 @@
 defmodule Swarm.Agreement.Round.Precedence do
-  @moduledoc """
-  Decides which of two rounds counts, by their ids `{epoch, counter, initiator}`: the higher one, unless
-  this robot's digest is out. Pure.
-  """
+  @moduledoc false
+  # Decides which of two rounds counts, by their ids `{epoch, counter, initiator}`: the higher one, unless
+  # this robot's digest is out. Pure.
   alias Swarm.Agreement.Round
   alias Swarm.Agreement.Round.{Letter, Tally}
 

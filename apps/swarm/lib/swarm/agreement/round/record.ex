@@ -1,8 +1,7 @@
 defmodule Swarm.Agreement.Round.Record do
-  @moduledoc """
-  Describes what a round agrees on: the report of each member of its view, and a digest by which two robots
-  know that they hold the same. Pure.
-  """
+  @moduledoc false
+  # Describes what a round agrees on: the report of each member of its view, and a digest by which two robots
+  # know that they hold the same. Pure.
   alias Swarm.Agreement.Election
   alias Swarm.Agreement.Round.Letter
 

@@ -1,10 +1,9 @@
 defmodule Swarm.Agreement.Round.Tally do
-  @moduledoc """
-  Counts what a robot has heard in a round: the reports and the digests of its view, and whether they are
-  all there and the same. Pure.
-
-  The first report and the first digest of a robot in a round are final.
-  """
+  @moduledoc false
+  # Counts what a robot has heard in a round: the reports and the digests of its view, and whether they are
+  # all there and the same. Pure.
+  #
+  # The first report and the first digest of a robot in a round are final.
   alias Swarm.Agreement.{Election, Round}
 
   @doc "Takes reports, of which those count that are new and of the view."
