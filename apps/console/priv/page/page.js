@@ -4,7 +4,9 @@ import { FloorView, colour } from "./map.js";
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
 const OLD_MS = 2000; // a scene comes ten times a second
-let heard, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
+// A stop is sent at any time; all else only while the fleet is heard.
+const STOP = /^\s*(e+[\s-]?stop|stop|halt|emergenc|disarm)/i;
+let heard = 0, ahead = -Infinity, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
 
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
@@ -17,6 +19,7 @@ function connect() {
   socket = new WebSocket(`ws://${location.host}/live`);
   socket.onopen = () => {
     tries = 0;
+    ahead = -Infinity;
     if (chosen) say(`look ${chosen}`);
   };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
@@ -33,9 +36,24 @@ function lost() {
   drive(false);
 }
 
+const silent = () => performance.now() - heard > OLD_MS || ahead === -Infinity;
+const refuse = (text) => answer({ ok: false, text });
+
+// With the time when it was given, by the server's clock. An order that cannot arrive in time is not sent at all.
 function say(line) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(line);
-  else answer({ ok: false, text: `not sent, because there is no connection: ${line}` });
+  if (socket?.readyState !== WebSocket.OPEN) return refuse(`not sent, because there is no connection: ${line}`);
+  if (!silent()) return socket.send(`@${Math.round(performance.now() + ahead)} ${line}`);
+  const stop = STOP.test(line);
+  if (!stop && !line.startsWith("look")) return refuse(`not sent, because the fleet is not heard: ${line}`);
+  socket.send(line);
+  if (stop) refuse("sent, but the fleet is not heard: look whether it stands, and press the robots' own buttons if it does not");
+}
+
+// How far the server's clock is ahead of this one's: what the fastest scene said, given up slowly in case a clock drifts.
+// A scene that took long would make an order seem older than it is, never younger.
+function tick(now) {
+  heard = performance.now();
+  ahead = Math.max(now - heard, ahead - 0.1);
 }
 
 function hear(message) {
@@ -49,7 +67,7 @@ function hear(message) {
     by("mission").replaceChildren(same, ...message.missions.map((name) => new Option(name)));
     floor.setMap(message);
   } else if (message.t === "scene") {
-    heard = performance.now();
+    tick(message.now);
     show(message);
   } else if (message.t === "about") about(message);
   else if (message.t === "answer") answer(message);
@@ -62,7 +80,7 @@ function answer({ ok, text }) {
 }
 
 // What is shown is old also where the connection stands and nothing comes.
-setInterval(() => performance.now() - heard > OLD_MS && lost(), 500);
+setInterval(() => silent() && lost(), 500);
 
 function show(next) {
   scene = next;

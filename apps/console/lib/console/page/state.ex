@@ -55,13 +55,15 @@ defmodule Console.Page.State do
 
   @doc """
   The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
-  robot of a real fleet may have no known pose. Only robots of one `frame` are drawn together; `apart` says why one is not
+  robot of a real fleet may have no known pose. `now_ms` is the time of this node (`System.monotonic_time/1`), by which the
+  page says when an order was given. Only robots of one `frame` are drawn together; `apart` says why one is not
   in that of most.
   """
-  @spec scene(Scene.t(), String.t() | nil, String.t() | nil) :: String.t()
-  def scene(%Scene{} = scene, pace, notice) do
+  @spec scene(Scene.t(), String.t() | nil, String.t() | nil, now_ms :: integer()) :: String.t()
+  def scene(%Scene{} = scene, pace, notice, now_ms) do
     Json.encode!(%{
       t: "scene",
+      now: now_ms,
       at_s: scene.at_ms / 1000,
       pace: pace,
       notice: notice,

@@ -9,7 +9,7 @@ defmodule Console.Teleop.Keys do
   | `a`, left; `d`, right | turns |
   | `+`, `-` | faster, slower |
   | space | stands |
-  | `e` | emergency stop of all robots |
+  | `e`, F8 | emergency stop of all robots |
   | `q`, Enter, Ctrl-C | drives no more |
   """
 
@@ -47,10 +47,12 @@ defmodule Console.Teleop.Keys do
   """
   @spec key(t(), String.t()) ::
           {nil | {:word, Console.Teleop.stick()} | :speed | :estop | :leave, t()}
-  def key(%{escape: escape} = keys, char) when (escape <> char) in ["\e", "\e[", "\eO"],
-    do: {nil, %{keys | escape: escape <> char}}
+  def key(%{escape: escape} = keys, char)
+      when (escape <> char) in ["\e", "\e[", "\eO", "\e[1", "\e[19"],
+      do: {nil, %{keys | escape: escape <> char}}
 
   def key(%{escape: ""} = keys, char), do: said(keys, char)
+  def key(%{escape: "\e[19"} = keys, "~"), do: said(keys, "e")
   def key(keys, "A"), do: said(keys, "w")
   def key(keys, "B"), do: said(keys, "s")
   def key(keys, "C"), do: said(keys, "d")
