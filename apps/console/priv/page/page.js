@@ -96,6 +96,8 @@ function show(next) {
   ];
   fleet.textContent = scene.notice ?? parts.filter(Boolean).join(" · ");
   fleet.className = scene.notice ? "lost" : "";
+  by("held").hidden = scene.estop === null;
+  if (scene.estop !== null) by("held").textContent = scene.estop;
   by("pace").hidden = scene.pace === null;
   scene.robots.forEach(row);
   leads();
@@ -142,7 +144,7 @@ function row(robot, index) {
   tr.children[1].textContent = (robot.alive ? words(robot.state) : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
   tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
-  tr.className = [!robot.alive && "dead", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
+  tr.className = [!robot.alive && "dead", robot.state === "E-STOP" && "held", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
   tr.setAttribute("aria-selected", robot.id === chosen);
 }
 

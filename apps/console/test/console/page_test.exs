@@ -346,7 +346,7 @@ defmodule Console.PageTest do
 
       Browser.await(
         browser,
-        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'idle')"
+        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'E-STOP') && document.getElementById('held').innerText.includes('called by demo: 2 of 2 robots held')"
       )
 
       Browser.run(browser, "location.reload()")

@@ -187,7 +187,13 @@ defmodule Console.Live.Trial do
 
   defp carry_out({:tell, target, "stop"}, state), do: tell(target, :stop, state)
   defp carry_out({:tell, target, "start"}, state), do: tell(target, :start, state)
-  defp carry_out(latch, state) when latch in [:estop, :reset], do: tell(:all, latch, state)
+  defp carry_out(:reset, state), do: tell(:all, :reset, state)
+
+  # One call for all.
+  defp carry_out(:estop, state) do
+    at_ms = state.module.scene(state.trial).at_ms
+    tell(:all, {:estop, {:demo, 0, at_ms}}, state)
+  end
 
   defp carry_out({:tell, target, "start:" <> text}, %{module: module, trial: trial} = state) do
     with {:ok, {mission, options}} <- Text.read(text, length(module.living(trial))),

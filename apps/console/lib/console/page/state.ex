@@ -72,6 +72,7 @@ defmodule Console.Page.State do
       formation: scene.formation && Tuple.to_list(scene.formation),
       error: scene.error && Enum.map(Tuple.to_list(scene.error), &round3/1),
       formed: scene.formed?,
+      estop: Format.estop(scene),
       landmark: point(scene.landmark),
       robots: Enum.map(scene.robots, &robot/1),
       told: told(scene.stages),
@@ -95,7 +96,7 @@ defmodule Console.Page.State do
       a: robot.pose && round3(robot.pose.heading),
       r: robot.radius,
       alive: robot.alive,
-      state: robot.state,
+      state: shown(robot.state),
       slot: point(robot.slot),
       off: robot.slot && round3(Scene.slot_error(robot)),
       unsure: round3(robot.uncertainty),
@@ -105,6 +106,9 @@ defmodule Console.Page.State do
       apart: robot[:apart]
     }
   end
+
+  defp shown(:estop), do: "E-STOP"
+  defp shown(state), do: state
 
   defp stage(stage),
     do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage), robot: stage[:robot]}
