@@ -69,7 +69,10 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :world_lost}),
     do: "the world has ended; robots stand still, it is started again"
 
-  def meaning(%{stage: :world_back}), do: "the world goes on where it was"
+  def meaning(%{stage: :world_back}),
+    do:
+      "the world goes on where it was; robots whose wheels fell silent stand, idle, until a start"
+
   def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
 
   def meaning(%{stage: :refused, robot: robot, from: from, epoch: epoch}),
