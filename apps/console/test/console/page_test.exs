@@ -122,7 +122,6 @@ defmodule Console.PageTest do
 
   describe "in a browser" do
     @describetag skip: @server || Browser.why_not()
-    @describetag timeout: 180_000
 
     defp open(url, size \\ {1280, 800}) do
       browser = Browser.open(size)
