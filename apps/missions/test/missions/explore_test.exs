@@ -53,6 +53,10 @@ defmodule Missions.ExploreTest do
     # Seen on all sides it is done; without room it is nowhere, which is not the same.
     closed = for row <- @room, do: String.replace(row, " ", "#")
     assert find(closed).found == []
+    everywhere = fn _at -> true end
+    assert Frontiers.unknown(find(closed), everywhere) == 0.0
+    assert_in_delta Frontiers.unknown(find(@room), everywhere), 0.2, 0.1
+    assert Frontiers.unknown(find(@room), fn {x, y} -> x < 3.0 and y > 1.0 end) == 0.0
     assert find(closed, {9.0, 9.0}) == nil
     assert Frontiers.find(SharedMap.raster(SharedMap.new()), {0.0, 0.0}, 0.2) == nil
   end
@@ -168,7 +172,12 @@ defmodule Missions.ExploreTest do
   test "in a closet it has explored all within seconds, and is told otherwise by others" do
     closet = [sonar: List.duplicate(0.6, 16)]
     {runner, effects} = ticks(explore(), 0..60, Pose.new(0, 0), closet)
-    assert runner.claim.formed and runner.claim.phase == :explored
+
+    # Between its sonars it has seen no wall, and has no room to look: that is not what it was asked for.
+    assert %{formed: false, phase: :explored} = runner.claim
+
+    assert runner.claim.says =~
+             ~r/; it has no room to get to the \d\d % of its edge that are unknown$/
 
     assert [%{says: "says that 1 m² are explored" <> _}] =
              for({:stage, :explored, facts} <- effects, do: facts)

@@ -47,7 +47,7 @@ defmodule Robot.Navigation.Frontiers do
   @type frontier :: %{at: Pose.point(), far: float(), size: pos_integer(), square: integer()}
 
   @typedoc """
-  `squares` has a byte for each: 0 unknown, 1 open, 2 closed, 3 narrow; `costs` are ways from the robot in steps of 10 cm, by the
+  `squares` has a byte for each: 0 unknown, 1 open, 2 wall, 3 narrow, 4 free without room for the robot; `costs` are ways from the robot in steps of 10 cm, by the
   number of the square.
   """
   @type t :: %__MODULE__{
@@ -87,7 +87,7 @@ defmodule Robot.Navigation.Frontiers do
 
     with start when start != nil <- start(field, from) do
       field = %{field | costs: spread(field, %{start => 0}, %{0 => [start]}, 0)}
-      %{field | found: found(field)}
+      %{field | found: found(field, [1])}
     end
   end
 
@@ -116,6 +116,7 @@ defmodule Robot.Navigation.Frontiers do
         open?(s3, c3, need) or open?(s4, c4, need) -> 1
         open?(s1, c1, @some) or open?(s2, c2, @some) -> 3
         open?(s3, c3, @some) or open?(s4, c4, @some) -> 3
+        s1 == 1 or s2 == 1 or s3 == 1 or s4 == 1 -> 4
         true -> 2
       end
 
@@ -178,10 +179,39 @@ defmodule Robot.Navigation.Frontiers do
   defp step(1, far), do: far
   defp step(3, far), do: @times * far
 
-  defp found(field) do
+  @doc """
+  The share of the edge of what is known to be free, along which nothing is known: 0 where walls are all round, 1 where none
+  was seen. What is left of it where no frontier is left is what the robot does not get to. Only places that count are
+  looked at.
+  """
+  @spec unknown(t(), counts? :: (Pose.point() -> boolean())) :: float()
+  def unknown(%{squares: squares, width: width} = field, counts?) do
+    {unknown, walls} =
+      for {kind, number} <- Enum.with_index(:binary.bin_to_list(squares)),
+          kind in [1, 3, 4],
+          counts?.(centre(field, number)),
+          {i, j} = {rem(number, width), div(number, width)},
+          {di, dj} <- [{-1, 0}, {1, 0}, {0, -1}, {0, 1}],
+          reduce: {0, 0} do
+        {unknown, walls} ->
+          case at(field, i + di, j + dj) do
+            0 -> {unknown + 1, walls}
+            2 -> {unknown, walls + 1}
+            _free -> {unknown, walls}
+          end
+      end
+
+    unknown / max(unknown + walls, 1)
+  end
+
+  @doc "The frontiers that have narrow squares, too: the second choice."
+  @spec narrow(t()) :: [frontier()]
+  def narrow(field), do: found(field, [1, 3])
+
+  defp found(field, kinds) do
     edge =
       for {number, _cost} <- field.costs,
-          :binary.at(field.squares, number) == 1,
+          :binary.at(field.squares, number) in kinds,
           edge?(field, number),
           into: MapSet.new(),
           do: number
