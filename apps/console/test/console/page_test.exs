@@ -134,6 +134,10 @@ defmodule Console.PageTest do
     defp fleet(browser),
       do: Browser.run(browser, "return document.getElementById('fleet').textContent")
 
+    # What a keyboard says again and again of a W that is held.
+    defp repeat(browser),
+      do: Browser.keyboard(browser, :down, code: "KeyW", key: "w", autoRepeat: true)
+
     # Where a place of the map is in the window.
     defp pixel(browser, {x, y}) do
       [px, py] =
@@ -313,7 +317,7 @@ defmodule Console.PageTest do
       to.("#drive")
       Browser.press(browser, [:enter])
       Browser.key(browser, :keyDown, "w")
-      wait(fn -> Swarm.status(:min1).by == :move end)
+      wait(fn -> repeat(browser) && Swarm.status(:min1).by == :move end)
 
       # Wherever the focus is, also where text is typed.
       to.("#line")
@@ -402,7 +406,7 @@ defmodule Console.PageTest do
             fn -> Browser.close(browser) end
           ] do
         Browser.key(browser, :keyDown, "w")
-        wait(fn -> Swarm.status(id).speed > 0.1 end)
+        wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
         ending.()
         wait(fn -> Swarm.status(id).speed == 0.0 end)
       end
@@ -424,7 +428,7 @@ defmodule Console.PageTest do
 
       [%{id: id}] = Live.Fleet.scene(live).robots
       Browser.key(browser, :keyDown, "w")
-      wait(fn -> Swarm.status(id).speed > 0.1 end)
+      wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
       [client] = clients(live)
       Process.exit(client, :kill)
       killed_ms = System.monotonic_time(:millisecond)
