@@ -123,6 +123,28 @@ defmodule Console.TeleopTest do
     assert {[:estop, :leave], _keys} = typed.("eq", keys)
   end
 
+  test "keys whose sequences end like those of driving drive nobody" do
+    # Arrows with Ctrl and Alt; F1 to F5 of xterm, rxvt and the Linux console; Home, Delete, a paste, Shift and Tab.
+    others =
+      ~w([1;5A [1;5D [1;3D OP OQ OR OS [11~ [15~ [[A [[D [[E [H OH [3~ [200~ [1;2S [Z) ++
+        ["[24;5~"]
+
+    for other <- others, escape <- ["\e", "\e\e"] do
+      {said, keys} =
+        Enum.map_reduce(String.graphemes(escape <> other), Keys.new(:mag1), &Keys.key(&2, &1))
+
+      assert {Enum.uniq(said), other} == {[nil], other}
+      # What comes next is itself.
+      assert {{:word, {0.6, +0.0}}, _keys} = Keys.key(keys, "w")
+    end
+
+    # A person who types in the middle of one stands and stops all the same.
+    {_said, keys} = Enum.map_reduce(["\e", "["], Keys.new(:mag1), &Keys.key(&2, &1))
+    assert {{:word, {+0.0, +0.0}}, _keys} = Keys.key(keys, " ")
+    assert {:estop, _keys} = Keys.key(keys, "e")
+    assert {:leave, _keys} = Keys.key(keys, <<3>>)
+  end
+
   describe "a gamepad" do
     @describetag :realtime
 
