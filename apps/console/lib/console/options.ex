@@ -29,6 +29,7 @@ defmodule Console.Options do
             page: 0,
             page_address: {127, 0, 0, 1},
             page_token: nil,
+            page_origin: nil,
             plan: nil,
             headless: false,
             speed: nil,
@@ -313,7 +314,8 @@ the prompt then takes pause, step, speed"},
   defp check_speed(other), do: other
 
   defp check_page({:ok, options}) do
-    with {:error, line} <- Page.check(options.page_address, options.page_token),
+    with {:error, line} <-
+           Page.check(options.page_address, options.page_token, options.page_origin),
          do: {:error, [line]},
          else: (:ok -> {:ok, options})
   end

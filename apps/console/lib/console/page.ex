@@ -27,7 +27,7 @@ defmodule Console.Page do
   @typedoc """
   `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
   which these are now; `address` (loopback) and `port` (any that is
-  free) to listen on; `token` is demanded where the address is not the loopback's.
+  free) to listen on; `token` is demanded where the address is not the loopback's; `origin` is that of a proxy before the page.
   """
   @type option ::
           {:module, module()}
@@ -36,6 +36,7 @@ defmodule Console.Page do
           | {:address, :inet.ip_address()}
           | {:port, :inet.port_number()}
           | {:token, String.t() | nil}
+          | {:origin, String.t() | nil}
 
   @doc """
   Starts it, and says where it is, such as `http://127.0.0.1:40123/`; the error says in one line why there is no page,
@@ -43,7 +44,7 @@ defmodule Console.Page do
   """
   @spec start_link([option()]) :: {:ok, pid(), url :: String.t()} | {:error, line :: String.t()}
   def start_link(options) do
-    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil] ++ options)
+    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil, origin: nil] ++ options)
 
     with :ok <- server(),
          :ok <- guarded(options),
@@ -64,11 +65,20 @@ defmodule Console.Page do
     end
   end
 
-  defp guarded(%{address: address, token: token}) do
-    if token != nil or Page.Access.loopback?(address),
-      do: :ok,
-      else: {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
+  defp guarded(%{address: address, token: nil, origin: origin}) do
+    cond do
+      not Page.Access.loopback?(address) ->
+        {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
+
+      origin != nil ->
+        {:error, "by #{origin} others can reach the page: it needs a token"}
+
+      true ->
+        :ok
+    end
   end
+
+  defp guarded(_with_a_token), do: :ok
 
   # The server says of a port that is taken only that it fell.
   defp free(%{address: address, port: port}) do
@@ -85,7 +95,8 @@ defmodule Console.Page do
   def init(options) do
     robots = options.robots
     robots = if is_list(robots), do: fn -> robots end, else: robots
-    request = {Request, :answer, [%{robots: robots, token: options.token, page: self()}]}
+    page = options |> Map.take([:token, :origin]) |> Map.merge(%{robots: robots, page: self()})
+    request = {Request, :answer, [page]}
 
     server = %{
       id: :server,

@@ -5,7 +5,7 @@ import { HeldKeys, modified } from "./keys.js";
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
 const OLD_MS = 2000; // a scene comes ten times a second
-let heard, socket, chosen, scene, told = 0, tries = 0, driving = false, timer;
+let heard, socket, chosen, scene, told = 0, tries = 0, driving = false, timer, opened = false, focused = null;
 const held = new HeldKeys();
 
 // Reachable for tests and the curious.
@@ -15,15 +15,22 @@ const floor = window.floor = new FloorView(by("map"), {
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
 });
 
+// Beside this page, wherever a proxy puts it; with its token, if its address has one.
+const live = new URL(`live${location.search}`, location.href);
+live.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+
 function connect() {
-  socket = new WebSocket(`ws://${location.host}/live`);
+  socket = new WebSocket(live);
   socket.onopen = () => {
     tries = 0;
+    opened = true;
+    controls(true);
     if (chosen) say(`look ${chosen}`);
   };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
   socket.onclose = () => {
     lost();
+    if (!opened) by("fleet").textContent = `No connection to the fleet. If this page is behind a proxy, start the program with --page-origin ${location.origin}`;
     setTimeout(connect, Math.min(5000, 250 * 2 ** tries++));
   };
 }
@@ -33,6 +40,20 @@ function lost() {
   fleet.textContent = "No connection to the fleet. What you see is old, and the buttons reach nobody.";
   fleet.className = "lost";
   drive(false);
+  controls(false);
+}
+
+// What cannot work looks so. While nothing comes, but the connection stands, the emergency stop is tried: it is obeyed at any age.
+function controls(on) {
+  const open = socket.readyState === WebSocket.OPEN;
+  if (!on) focused ??= document.activeElement;
+  for (const set of document.querySelectorAll("fieldset")) set.disabled = !(open && (on || set.id === "stop"));
+  const label = by("estop");
+  if (open !== (label.childElementCount === 0))
+    label.replaceChildren(open ? label.textContent : Object.assign(document.createElement("s"), { textContent: label.textContent }));
+  if (!on) return;
+  if (focused && document.activeElement === document.body) focused.focus();
+  focused = null;
 }
 
 function say(line) {
@@ -52,6 +73,7 @@ function hear(message) {
     floor.setMap(message);
   } else if (message.t === "scene") {
     heard = performance.now();
+    controls(true);
     show(message);
   } else if (message.t === "about") about(message);
   else if (message.t === "answer") answer(message);
@@ -322,4 +344,5 @@ by("command").onsubmit = (e) => {
   line.value = "";
 };
 
+by("fleet").textContent = "connecting …";
 connect();

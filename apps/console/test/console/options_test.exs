@@ -127,6 +127,25 @@ defmodule Console.OptionsTest do
     assert error("--robots 3 --fleet mag:3") =~ "exclude each other"
   end
 
+  test "a proxy is named as browsers name it, and the page behind it has a token" do
+    for {text, origin} <- [
+          {"https://robots.lab.example", "https://robots.lab.example"},
+          {"https://Robots.lab.example:443/", "https://robots.lab.example"},
+          {"http://10.0.0.7:8080", "http://10.0.0.7:8080"}
+        ] do
+      assert {:ok, %{page_origin: ^origin}} =
+               parse("--page-token a-secret-token --page-origin #{text}")
+    end
+
+    for wrong <-
+          ~w(robots.lab.example ftp://a.example https:// https://a.example/fleet https://u@a.example https://a.example?b) do
+      assert error("--page-token a-secret-token --page-origin #{wrong}") ==
+               "--page-origin: expected an address without a path, such as https://robots.lab.example, got #{inspect(wrong)}"
+    end
+
+    assert error("--page-origin https://robots.lab.example") =~ "--page-origin needs"
+  end
+
   test "a robot that does not exist is refused" do
     assert error("--kill mag9@3") =~ ~s("mag9"; allowed are leader, mag1 to mag3, min1 to min3)
   end

@@ -121,6 +121,13 @@ defmodule Console.Browser do
   def mouse(browser, type, event),
     do: tools(browser, "Input.dispatchMouseEvent", event |> Map.new() |> Map.put(:type, type))
 
+  @doc "Lets nothing load whose address is like one of these (`*/page.js`)."
+  @spec block(%__MODULE__{}, [String.t()]) :: term()
+  def block(browser, addresses) do
+    tools(browser, "Network.enable", %{})
+    tools(browser, "Network.setBlockedURLs", %{urls: addresses})
+  end
+
   defp tools(browser, method, params),
     do: command(browser, :post, "/goog/cdp/execute", %{cmd: method, params: params})
 

@@ -9,7 +9,9 @@ defmodule Console.Options.Page do
     [
       {"page-address", "A", &address/1,
        "where the page is reached, such as 0.0.0.0, by other machines too (127.0.0.1)"},
-      {"page-token", "T", &token/1, "what others must know to use the page: ?token=T"}
+      {"page-token", "T", &token/1, "what others must know to use the page: ?token=T"},
+      {"page-origin", "URL", &origin/1,
+       "how browsers know the page behind a proxy, such as https://robots.lab.example"}
     ]
   end
 
@@ -20,19 +22,38 @@ defmodule Console.Options.Page do
          do: {:error, "a port from 0 to 65535"}
   end
 
-  @doc "Who reaches the page may move robots: beyond this machine it needs a token."
-  @spec check(:inet.ip_address(), String.t() | nil) :: :ok | {:error, line :: String.t()}
-  def check(address, token) do
-    if token != nil or Page.Access.loopback?(address),
-      do: :ok,
-      else:
-        {:error,
-         "--page-address of other machines needs --page-token: whoever knows it may command the robots"}
+  @doc "Who reaches the page may move robots: beyond this machine, and behind a proxy, it needs a token."
+  @spec check(:inet.ip_address(), String.t() | nil, String.t() | nil) ::
+          :ok | {:error, line :: String.t()}
+  def check(address, token, origin) do
+    cond do
+      token != nil -> :ok
+      not Page.Access.loopback?(address) -> needs_token("--page-address of other machines")
+      origin != nil -> needs_token("--page-origin")
+      true -> :ok
+    end
   end
+
+  defp needs_token(what),
+    do: {:error, "#{what} needs --page-token: whoever knows it may command the robots"}
 
   defp address(text) do
     with {:error, _reason} <- :inet.parse_ipv4strict_address(String.to_charlist(text)),
          do: {:error, "an IPv4 address of this machine"}
+  end
+
+  # As browsers write it: in small letters, without the port that goes without saying, and without a path.
+  defp origin(text) do
+    case URI.new(text) do
+      {:ok, %URI{scheme: scheme, host: host, userinfo: nil, query: nil, fragment: nil} = uri}
+      when scheme in ["http", "https"] and host not in [nil, ""] and uri.path in [nil, "/"] ->
+        default? = uri.port == URI.default_port(scheme)
+        port = if default?, do: "", else: ":#{uri.port}"
+        {:ok, String.downcase("#{scheme}://#{host}") <> port}
+
+      _no_origin ->
+        {:error, "an address without a path, such as https://robots.lab.example"}
+    end
   end
 
   defp token(text) do

@@ -36,13 +36,13 @@ defmodule Console.Page.Request do
   # How long a browser may take to read what was sent before its connection is closed.
   @send_timeout_ms 10_000
 
-  @doc "Answers one request; `page` has the robots and the token."
+  @doc "Answers one request; `page` has the robots, the token and the origin."
   @spec answer(term(), map()) :: term()
   def answer({:mochiweb_request, _state} = request, page) do
     path = request |> get(:path) |> List.to_string()
 
     with "GET" <- request |> get(:method) |> to_string(),
-         :ok <- Page.Access.check(asked(request), page.token) do
+         :ok <- Page.Access.check(asked(request), page.token, page.origin) do
       serve(path, request, page)
     else
       {status, line} -> say(request, status, line)
@@ -91,13 +91,21 @@ defmodule Console.Page.Request do
   # The token in the address is needed once.
   defp entered(_request, %{token: nil}), do: []
 
-  defp entered(request, %{token: token}) do
+  defp entered(request, %{token: token} = page) do
     if query(request, "token"),
       do: [
-        {"Set-Cookie", "token=#{URI.encode_www_form(token)}; HttpOnly; SameSite=Strict; Path=/"}
+        {"Set-Cookie",
+         "token=#{URI.encode_www_form(token)}; HttpOnly; SameSite=Strict; Path=/" <>
+           secure(request, page)}
       ],
       else: []
   end
+
+  # A cookie of HTTPS does not go over the line in the clear.
+  defp secure(request, %{origin: "https:" <> _ = origin}),
+    do: if(Page.Access.proxy?(header(request, "Host") || "", origin), do: "; Secure", else: "")
+
+  defp secure(_request, _page), do: ""
 
   defp live(request, %{page: page, robots: robots}) do
     feed = Feed.of(page)
