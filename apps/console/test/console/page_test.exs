@@ -103,7 +103,7 @@ defmodule Console.PageTest do
       assert {:error, line} = Page.start_link(source ++ [address: {0, 0, 0, 0}])
       assert line =~ "it needs a token"
       assert {:error, [line]} = Options.parse(~w(--page-address 0.0.0.0))
-      assert line =~ "--page-token"
+      assert line =~ "--page-token-file"
     end
   end
 

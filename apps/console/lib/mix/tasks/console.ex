@@ -27,7 +27,7 @@ defmodule Mix.Tasks.Console do
       {"connect", "NAME@HOST", &connect/1,
        "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
       {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
-    ] ++ Console.Options.Page.table()
+    ] ++ Console.Options.Page.table(System.get_env("CONVOY_FROM", "."))
   end
 
   defp help do
@@ -65,7 +65,7 @@ defmodule Mix.Tasks.Console do
     do:
       Console.Options.Page.check(
         options["page-address"],
-        options["page-token"],
+        options["page-token-file"],
         options["page-origin"]
       )
 
@@ -76,7 +76,7 @@ defmodule Mix.Tasks.Console do
       robots: fn -> Live.Mesh.robots(live) end,
       port: Map.get(options, "page", 0),
       address: options["page-address"],
-      token: options["page-token"],
+      token: options["page-token-file"],
       origin: options["page-origin"]
     ]
   end
