@@ -7,7 +7,8 @@ defmodule Console.Page.Door do
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_clock, :mochiweb_http]}
   require Logger
-  alias Console.Page.{Access, Connections, Guesses, Request}
+  alias Console.Page
+  alias Console.Page.{Connections, Guesses, Request}
 
   @look_ms 250
   @acceptors 8
@@ -79,7 +80,7 @@ defmodule Console.Page.Door do
         {:reply, :late, s}
 
       address ->
-        right? = Access.same?(token, s.page.token)
+        right? = Page.Access.same?(token, s.page.token)
         {answer, untold, guesses} = Guesses.guess(s.guesses, address, right?, Hal.Clock.now_ms())
         if untold, do: tell(address, untold)
         {:reply, answer, %{s | guesses: guesses}}
