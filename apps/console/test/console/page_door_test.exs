@@ -40,12 +40,12 @@ defmodule Console.PageDoorTest do
 
     test "the newest is let in: of too many strangers the oldest goes, of the address that has most" do
       one = self()
-      connections = all(7, :stranger, 100..162) |> all(8, :stranger, [0])
+      connections = all(7, :stranger, 100..298) |> all(8, :stranger, [0])
       assert {connections, [gone]} = Connections.add(connections, one, {10, 0, 0, 8}, 200)
       assert {state(connections, one), state(connections, gone)} == {{:stranger, 200}, nil}
 
       assert Enum.frequencies_by(Map.values(connections.all), &elem(&1, 0)) == %{
-               {10, 0, 0, 7} => 62,
+               {10, 0, 0, 7} => 198,
                {10, 0, 0, 8} => 2
              }
     end
@@ -60,7 +60,7 @@ defmodule Console.PageDoorTest do
         end)
 
       assert Map.take(many.all, Map.keys(live.all)) == live.all
-      assert map_size(many.all) == map_size(live.all) + 64
+      assert map_size(many.all) == map_size(live.all) + 200
 
       {known, []} = Connections.add(live, self(), {10, 0, 0, 10}, 1_000)
       assert {known, [idle]} = Connections.note(known, self(), :busy, 1_000)

@@ -15,7 +15,7 @@ defmodule Console.Page.Connections do
   # | `:live` (a WebSocket) | its last word: of the page, or of the browser, which answers each ping | 20 s |
 
   @longest_ms %{stranger: 2_000, busy: 30_000, idle: 15_000, live: 20_000}
-  @most_strangers 64
+  @most_strangers 200
   @most_known 200
 
   defstruct all: %{}
