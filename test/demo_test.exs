@@ -9,7 +9,6 @@ defmodule Demo.Case do
   using do
     quote do
       import Demo.Case
-      @moduletag timeout: 300_000
       @root unquote(@root)
     end
   end

@@ -22,7 +22,6 @@ defmodule Docs.Case do
     quote do
       alias Docs.{Checks, LookedAt, Reader, Sandbox, Shown}
       # Each of its commands has a minute.
-      @moduletag timeout: 600_000
       @moduletag unquote(options[:tags] || [])
 
       for document <- unquote(options[:documents]) do

@@ -4,7 +4,6 @@ defmodule System.ExampleTest do
   release with its own driver.
   """
   use ExUnit.Case, async: true
-  @moduletag timeout: 300_000
   @root Path.expand("..", __DIR__)
 
   setup do

@@ -33,14 +33,17 @@ defmodule System.NodesWorldTest do
   @moduletag :realtime
 
   @tag long: true, realtime: :long
-  test "kill -9 of the world's process: it comes back, and robots go on", %{environment: env} do
-    port = start("--robots 2 --duration 45", env)
+  test "kill -9 of the world's process: it comes back, robots stand, and go on when they are told to",
+       %{environment: env} do
+    port = start("--robots 2 --duration 60", env, "")
     said = await(port, ~r/elected +\w+ leads/)
     kill(pid(said, "world"))
-    said = await(port, "world_back", said)
+    said = await(port, ~r/world_back .*until a start/, said)
+    said = await(port, ~r/world_back.* s  2 robots, .*no leader/s, said)
+    true = Port.command(port, "start\n")
     {said, status} = ending(port, said)
     assert status in [0, 2]
-    assert said =~ ~r/world_lost.*world_back.*formed/s
+    assert said =~ ~r/world_lost.*world_back.*start: accepted.*formed +every robot/s
     assert said =~ ~r/"name":"mag1","alive":true/
     assert said =~ ~r/"name":"min1","alive":true/
   end

@@ -1,7 +1,6 @@
 defmodule System.OutputTest do
   @moduledoc "Commands whose standard output is lost say so, also if they print once, at their end."
   use ExUnit.Case, async: true
-  @moduletag timeout: 300_000
   @moduletag :tmp_dir
   @root Path.expand("..", __DIR__)
 

@@ -6,7 +6,6 @@ defmodule System.ScenariosTest do
   alias Sim.Scenario.Runner
 
   @files Path.wildcard(Path.expand("scenarios/*.exs", __DIR__))
-  @moduletag timeout: 300_000
 
   test "there are enough, each says what it is for and expects something" do
     assert length(@files) >= 20

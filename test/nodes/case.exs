@@ -35,9 +35,9 @@ defmodule Nodes.Case do
     end
   end
 
-  @doc "Starts a run with these options; it ends with the test."
-  def start(line, environment) do
-    arguments = OptionParser.split("--nodes --headless --blobs direct --json - " <> line)
+  @doc "Starts a run with these options; it ends with the test. One that is not headless takes commands."
+  def start(line, environment, view \\ "--headless") do
+    arguments = OptionParser.split("#{view} --nodes --blobs direct --json - " <> line)
     environment = for {name, value} <- environment, do: {to_charlist(name), to_charlist(value)}
     options = [:binary, :exit_status, :stderr_to_stdout, args: arguments, env: environment]
     port = Port.open({:spawn_executable, Path.join(@root, "bin/demo")}, options)

@@ -10,7 +10,6 @@ defmodule Release.Case do
   using do
     quote do
       import Release.Case
-      @moduletag timeout: 300_000
     end
   end
 

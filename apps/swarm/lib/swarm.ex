@@ -283,8 +283,10 @@ defmodule Swarm do
   """
   @spec reset() :: answer()
   def reset do
-    Broadcaster.quiet(:all)
-    command(:all, :reset)
+    with :ok <- Commands.Client.timely() do
+      Broadcaster.quiet(:all)
+      command(:all, :reset)
+    end
   end
 
   @doc """
@@ -316,6 +318,17 @@ defmodule Swarm do
   """
   @spec acknowledge(robot() | [robot()] | :all) :: answer()
   def acknowledge(robots), do: command(robots, :acknowledge)
+
+  @doc """
+  Calls a function whose orders count as given at `at_us` (`System.monotonic_time/1` of this node, in microseconds), and
+  returns what it returns. For orders that have waited, in a queue or on a connection: they are refused when they are older
+  than half a second, and by robots that were stopped since. A stop is carried out at any age.
+
+      Swarm.given(heard_us, fn -> Swarm.goto(:mag1, {2.0, 1.0}) end)
+      {:error, "given 0.8 s ago and not carried out: at most 0.5 s are allowed; repeat it"}
+  """
+  @spec given(at_us :: integer(), (... -> result)) :: result when result: term()
+  defdelegate given(at_us, fun), to: Commands.Client
 
   @doc false
   @spec ask(atom(), term()) :: term()

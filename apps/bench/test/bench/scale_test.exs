@@ -12,7 +12,6 @@ defmodule Bench.ScaleTest do
   @seconds 12
 
   @tag :long
-  @tag timeout: 600_000
   @tag skip: unless(System.otp_release() == @otp, do: "they were counted with OTP #{@otp}")
   test "a robot costs no more than it did, in fleets of 6, 20 and 50" do
     for {robots, before} <- @reductions do

@@ -10,8 +10,9 @@ defmodule Console.Page do
       Console.Page (one_for_one)
       |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
       `-- Console.Page.Door    a process for each connection, in which mochiweb runs; ends those that say nothing
-          `-- of a WebSocket: Console.Page.Client carries out what is typed and clicked; a pusher writes the newest
-              scene, as fast as the browser takes it; all three end together, and the page connects again
+          `-- of a WebSocket: Console.Orders carries out what is typed and clicked, Console.Page.Client tells of the robot
+              that is looked at, a pusher writes the newest scene, as fast as the browser takes it; all end together, and
+              the page connects again
 
   Who may look and command is decided by `Console.Page.Access`.
   """

@@ -8,6 +8,7 @@ defmodule Console.Prompt do
   alias Console.Cli
   alias Console.Cli.Parse
   alias Console.Live.Pace
+  alias Console.Prompt.Stop
   alias Hal.Options.Suggest
   alias Robot.Command
   alias Swarm.Missions
@@ -49,11 +50,74 @@ defmodule Console.Prompt do
     do: {:error, "expected a line of at most #{@most_bytes} bytes"}
 
   def parse(text, robots) do
-    case String.split(text) do
-      [] -> {:ok, :nothing}
-      [word | rest] -> command(String.downcase(word), rest, robots)
+    with :other <- stop(text, robots) do
+      case String.split(text) do
+        [] ->
+          {:ok, :nothing}
+
+        [word | rest] ->
+          text |> String.downcase() |> key(command(String.downcase(word), rest, robots))
+      end
     end
   end
+
+  # On the way of a stop one is generous.
+  defp stop(text, robots) do
+    if String.valid?(text),
+      do: Stop.read(text, @words ++ Enum.map(robots, &to_string/1), robots),
+      else: :other
+  end
+
+  defp key(text, {:error, line}) do
+    if text =~ ~r/stop|halt|emerg|disarm/,
+      do: {:error, line <> "; F8 and estop stop all robots"},
+      else: {:error, line}
+  end
+
+  defp key(_text, parsed), do: parsed
+
+  @doc """
+  What a parsed line is: a `:stop`, which goes past all others, an `:order` to the fleet, or something for the view itself.
+
+      iex> for line <- ["estop", "stop mag1", "disarm", "start", "help", "status"] do
+      ...>   {:ok, parsed} = Console.Prompt.parse(line, [:mag1])
+      ...>   Console.Prompt.kind(parsed)
+      ...> end
+      [:stop, :stop, :stop, :order, :view, :view]
+  """
+  @spec kind(parsed()) :: :stop | :order | :view
+  def kind(:estop), do: :stop
+  def kind({:tell, _target, word}) when word in ["stop", "disarm"], do: :stop
+  def kind({view, _what}) when view in [:drive, :gamepad, :status], do: :view
+  def kind(view) when view in [:help, :nodes, :status, :quit, :nothing], do: :view
+  def kind(_command), do: :order
+
+  @doc """
+  How an answer begins: the line as it was typed, and what it was taken for, if that is not what stands there.
+
+      iex> Console.Prompt.said("estop now!", :estop)
+      "estop now! (estop)"
+      iex> Console.Prompt.said(" goto mag1 1,2 ", {:tell, [:mag1], "goto:1.0:2.0"})
+      "goto mag1 1,2"
+  """
+  @spec said(String.t(), parsed()) :: String.t()
+  def said(line, parsed) do
+    line = String.trim(line)
+    meant = meant(parsed)
+    if meant == nil or String.downcase(line) in meant, do: line, else: "#{line} (#{hd(meant)})"
+  end
+
+  defp meant(:estop), do: ["estop"]
+
+  defp meant({:tell, :all, stop}) when stop in ["stop", "disarm"],
+    do: ["#{stop} all", stop, "all #{stop}"]
+
+  defp meant({:tell, robots, stop}) when stop in ["stop", "disarm"] do
+    names = Enum.join(robots, " ")
+    ["#{stop} #{names}", "#{names} #{stop}"]
+  end
+
+  defp meant(_other), do: nil
 
   @doc "The longest line that is read, in bytes."
   @spec most_bytes() :: pos_integer()
@@ -114,7 +178,7 @@ defmodule Console.Prompt do
         "replace flock                 they stand, change to another mission, and go on;",
         "replace mag2 patrol           what ends within 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
-        "estop, reset                  emergency stop of all, until the reset",
+        "estop, or F8; reset           emergency stop of all, until the reset",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
       ] ++
       when_offered.(:arm, [
@@ -192,10 +256,8 @@ defmodule Console.Prompt do
   defp command("gamepad", _rest, _robots),
     do: {:error, "gamepad needs one name, or off: gamepad mag1, gamepad mag1 /dev/input/js1"}
 
-  defp command(word, [], _robots) when word in ["stop", "start"], do: {:ok, {:tell, :all, word}}
-
-  defp command(word, ["all"], _robots) when word in ["stop", "start"],
-    do: {:ok, {:tell, :all, word}}
+  defp command("start", [], _robots), do: {:ok, {:tell, :all, "start"}}
+  defp command("start", ["all"], _robots), do: {:ok, {:tell, :all, "start"}}
 
   defp command("start", [mission | rest], robots) when length(rest) < 2 do
     if mission in ["all" | Enum.map(robots, &to_string/1)],
@@ -217,7 +279,6 @@ defmodule Console.Prompt do
   defp command(word, _rest, _robots) when word in ["arm", "disarm", "acknowledge"],
     do: {:error, "#{word} needs one name, or all: #{word} mag1, #{word} all"}
 
-  defp command("estop", [], _robots), do: {:ok, :estop}
   defp command("reset", [], _robots), do: {:ok, :reset}
 
   defp command(word, [], _robots) when word in ["pause", "resume"],

@@ -79,6 +79,10 @@ defmodule Console.Terminal do
     {Enum.take(rows, -view.rows), view}
   end
 
+  # Before all else.
+  defp header(%{estop: %{}} = scene, _columns, _pace),
+    do: [{" #{Format.estop(scene)}", :alarm}]
+
   defp header(scene, columns, pace) do
     {kind, spacing} = scene.formation
     ground = Floorplan.of(scene.map)

@@ -5,7 +5,9 @@ import { HeldKeys, modified } from "./keys.js";
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
 const OLD_MS = 2000; // a scene comes ten times a second
-let heard, socket, chosen, scene, told = 0, tries = 0, driving = false, timer, opened = false, focused = null;
+// A stop is sent at any time; all else only while the fleet is heard.
+const STOP = /^\s*(e+[\s-]?stop|stop|halt|emergenc|disarm)/i;
+let heard = 0, ahead = -Infinity, socket, chosen, scene, told = 0, tries = 0, driving = false, timer, opened = false, focused = null;
 const held = new HeldKeys();
 
 // Reachable for tests and the curious.
@@ -24,6 +26,7 @@ function connect() {
   socket.onopen = () => {
     tries = 0;
     opened = true;
+    ahead = -Infinity;
     controls(true);
     if (chosen) say(`look ${chosen}`);
   };
@@ -43,22 +46,39 @@ function lost() {
   controls(false);
 }
 
-// What cannot work looks so. While nothing comes, but the connection stands, the emergency stop is tried: it is obeyed at any age.
+// What cannot work looks so. While nothing comes, but the connection stands, orders look so, too, and say why when they are
+// clicked; a stop is tried at any time.
 function controls(on) {
   const open = socket.readyState === WebSocket.OPEN;
-  if (!on) focused ??= document.activeElement;
-  for (const set of document.querySelectorAll("fieldset")) set.disabled = !(open && (on || set.id === "stop"));
+  document.body.classList.toggle("silent", open && !on);
+  if (!open) focused ??= document.activeElement;
+  for (const set of document.querySelectorAll("fieldset")) set.disabled = !open;
   const label = by("estop");
   if (open !== (label.childElementCount === 0))
     label.replaceChildren(open ? label.textContent : Object.assign(document.createElement("s"), { textContent: label.textContent }));
-  if (!on) return;
+  if (!open) return;
   if (focused && document.activeElement === document.body) focused.focus();
   focused = null;
 }
 
+const silent = () => performance.now() - heard > OLD_MS || ahead === -Infinity;
+const refuse = (text) => answer({ ok: false, text });
+
+// With the time when it was given, by the server's clock. An order that cannot arrive in time is not sent at all.
 function say(line) {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(line);
-  else answer({ ok: false, text: `not sent, because there is no connection: ${line}` });
+  if (socket?.readyState !== WebSocket.OPEN) return refuse(`not sent, because there is no connection: ${line}`);
+  if (!silent()) return socket.send(`@${Math.round(performance.now() + ahead)} ${line}`);
+  const stop = STOP.test(line);
+  if (!stop && !line.startsWith("look")) return refuse(`not sent, because the fleet is not heard: ${line}`);
+  socket.send(line);
+  if (stop) refuse("sent, but the fleet is not heard: look whether it stands, and press the robots' own buttons if it does not");
+}
+
+// How far the server's clock is ahead of this one's: what the fastest scene said, given up slowly in case a clock drifts.
+// A scene that took long would make an order seem older than it is, never younger.
+function tick(now) {
+  heard = performance.now();
+  ahead = Math.max(now - heard, ahead - 0.1);
 }
 
 function hear(message) {
@@ -72,7 +92,7 @@ function hear(message) {
     by("mission").replaceChildren(same, ...message.missions.map((name) => new Option(name)));
     floor.setMap(message);
   } else if (message.t === "scene") {
-    heard = performance.now();
+    tick(message.now);
     controls(true);
     show(message);
   } else if (message.t === "about") about(message);
@@ -86,7 +106,7 @@ function answer({ ok, text }) {
 }
 
 // What is shown is old also where the connection stands and nothing comes.
-setInterval(() => performance.now() - heard > OLD_MS && lost(), 500);
+setInterval(() => silent() && lost(), 500);
 
 function show(next) {
   scene = next;
@@ -102,6 +122,8 @@ function show(next) {
   ];
   fleet.textContent = scene.notice ?? parts.filter(Boolean).join(" · ");
   fleet.className = scene.notice ? "lost" : "";
+  by("held").hidden = scene.estop === null;
+  if (scene.estop !== null) by("held").textContent = scene.estop;
   by("pace").hidden = scene.pace === null;
   scene.robots.forEach(row);
   leads();
@@ -148,7 +170,7 @@ function row(robot, index) {
   tr.children[1].textContent = (robot.alive ? words(robot.state) : away(robot)) + (robot.alive && robot.leader ? " ★" : "");
   tr.children[2].textContent = robot.alive ? metres(robot.off) : "";
   tr.children[3].textContent = robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "";
-  tr.className = [!robot.alive && "dead", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
+  tr.className = [!robot.alive && "dead", robot.state === "E-STOP" && "held", robot.frame !== floor.frame && "apart"].filter(Boolean).join(" ");
   tr.setAttribute("aria-selected", robot.id === chosen);
 }
 

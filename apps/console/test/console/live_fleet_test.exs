@@ -1,6 +1,6 @@
 defmodule Console.LiveFleetTest do
   use ExUnit.Case, async: false
-  alias Console.{Live, Options}
+  alias Console.{Live, Options, Orders, Prompt}
   @moduletag :capture_log
 
   test "people command whole robots, and errors say what is wrong" do
@@ -62,5 +62,58 @@ defmodule Console.LiveFleetTest do
     assert %{robots: 2, messages: %{sent: _}} = Live.Fleet.result(live)
     Sim.Fleet.stop(live)
     assert {:error, _line} = Live.Fleet.start_link(%{options | map: "nowhere"})
+  end
+
+  test "no order is carried out after a stop that came later, whatever waited before it" do
+    options = Options.trial(%Options{robots: [:mag62, :min62], blobs: :direct, landmark: :none})
+    {:ok, live} = Live.Fleet.start_link(Map.put(options, :mission, false))
+    Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:mag62, :min62] end)
+    test = self()
+    {:ok, orders} = Orders.start_link(&send(test, {:answer, &1, &2}))
+
+    order = fn text ->
+      {:ok, command} = Prompt.parse(text, [:mag62, :min62])
+      given_us = System.monotonic_time(:microsecond)
+      Orders.give(orders, Orders.of_line(text, command, {Live.Fleet, live}, given_us))
+      given_us
+    end
+
+    # One of them does not answer, and holds up what waits behind it.
+    comms = Robot.Names.whereis(:min62, :comms)
+    :ok = :sys.suspend(comms)
+    for _click <- 1..4, do: order.("goto min62 1,1")
+    given_us = order.("goto mag62 3,3")
+    assert_receive {:answer, "goto min62 1,1", {:error, "min62 does not answer"}}, 10_000
+    assert :ok = Swarm.Case.order(fn -> Swarm.stop() end)
+    :ok = :sys.resume(comms)
+    Orders.settle(orders)
+
+    for _click <- 1..3, do: assert_received({:answer, "goto min62 1,1", {:error, "given " <> _}})
+    assert_received {:answer, "goto mag62 3,3", {:error, "given " <> _}}
+    for id <- [:mag62, :min62], do: assert(%{state: :idle} = Swarm.status(id))
+
+    # Nor is one that a robot gets in time, but was given before: of a stop, and of an emergency stop and its reset.
+    early = fn -> Swarm.given(given_us, fn -> Swarm.goto(:mag62, {1.0, 1.0}) end) end
+    assert {:error, "given " <> _} = early.()
+
+    before = fn stop ->
+      given_us = System.monotonic_time(:microsecond)
+      stop.()
+      Swarm.given(given_us, fn -> Swarm.goto(:mag62, {1.0, 1.0}) end)
+    end
+
+    stopped = fn
+      {:error, "mag62 was stopped after this command was sent; repeat it"} -> true
+      {:error, "given " <> _on_a_busy_machine} -> false
+    end
+
+    Swarm.Case.eventually(fn -> stopped.(before.(&Swarm.stop/0)) end)
+
+    Swarm.Case.eventually(fn ->
+      stopped.(before.(fn -> {Swarm.estop(), Swarm.reset()} end))
+    end)
+
+    assert :ok = Swarm.Case.order(fn -> Swarm.goto(:mag62, {1.0, 1.0}) end)
+    Sim.Fleet.stop(live)
   end
 end

@@ -1,6 +1,6 @@
 defmodule Console.PageDoorTest do
   @moduledoc "Connections that say nothing, or the wrong thing, keep nobody out."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   import ExUnit.CaptureLog
   import Console.Wire
   alias Console.{Browser, Live, Options, Page}

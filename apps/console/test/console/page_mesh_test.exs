@@ -4,6 +4,7 @@ defmodule Console.PageMeshTest do
   obey: no other test runs meanwhile.
   """
   use ExUnit.Case, async: false
+  alias Console.Cli.Format
   alias Console.{Browser, Live, Page}
   alias Console.Live.Mesh.{Frames, Notice, View}
   alias Swarm.Status
@@ -20,11 +21,14 @@ defmodule Console.PageMeshTest do
 
     mag2 = %Status{robot: :mag2, state: :follow, leader: :mag1}
     view = View.new() |> at.(0, [mag2])
-    mag1 = %Status{robot: :mag1, state: "lead", leader: :mag1, estop: true}
+    mag1 = %Status{robot: :mag1, state: "lead", leader: :mag1, estop: true, estop_by: ["base"]}
     view = view |> at.(1, [mag1, mag2]) |> at.(2, [mag1, mag2])
 
-    assert [%{id: :mag2}, %{id: :mag1, state: "E-STOP", leader?: true}] =
-             View.scene(view, 0).robots
+    scene = View.scene(view, 2_500)
+    assert [%{id: :mag2}, %{id: :mag1, state: :estop, leader?: true}] = scene.robots
+
+    assert Format.estop(scene) ==
+             "EMERGENCY STOP for 1 s, called by base: 1 of 2 robots held (not mag2); reset frees them"
 
     assert View.scene(view, 0).leader == :mag1
 
@@ -33,6 +37,8 @@ defmodule Console.PageMeshTest do
         %{mag1 | estop: false, arming: :disarmed},
         %Status{robot: :mag2, state: :no_answer}
       ])
+
+    assert Format.estop(View.scene(view, 3_000)) == nil
 
     assert Enum.map(view.stages, &{&1.clock, &1.line}) == [
              {"14:00:00", "mag2 is heard"},
@@ -151,6 +157,12 @@ defmodule Console.PageMeshTest do
       Browser.await(
         browser,
         "return window.floor.scene.robots.every((r) => r.state === 'E-STOP')"
+      )
+
+      # A second person sees it, too, and why all stand.
+      Browser.await(
+        browser,
+        "return /EMERGENCY STOP for \\d+ s, called by .+: 2 of 2 robots held;/.test(document.getElementById('held').innerText)"
       )
 
       assert Swarm.status(:min41).estop

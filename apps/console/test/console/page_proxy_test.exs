@@ -1,6 +1,6 @@
 defmodule Console.PageProxyTest do
   @moduledoc "The page where its script or its connection is missing, and behind a proxy, in a real browser."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   alias Console.{Browser, HttpsProxy, Live, Options, Page}
   @moduletag :realtime
   @moduletag :capture_log
@@ -64,12 +64,26 @@ defmodule Console.PageProxyTest do
     assert [false, false, false, _fleet] = dead(browser)
 
     # The connection stands, and nothing comes: a stop may still arrive.
+    crossed = fn selector ->
+      Browser.run(browser, """
+      return getComputedStyle(document.querySelector('#{selector}')).textDecorationLine === 'line-through';
+      """)
+    end
+
     :sys.suspend(Page.Feed.of(page))
     Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
     assert [false, false, false, _fleet] = dead(browser)
-    assert Browser.run(browser, "return document.getElementById('start').matches(':disabled')")
+
+    assert Enum.map(["#estop", "[data-line=stop]", "#start", "#reset"], crossed) == [
+             false,
+             false,
+             true,
+             true
+           ]
+
     :sys.resume(Page.Feed.of(page))
-    Browser.await(browser, "return !document.getElementById('start').matches(':disabled')")
+    Browser.await(browser, "return document.getElementById('fleet').className === ''")
+    refute crossed.("#start")
 
     Process.unlink(page)
     :ok = Supervisor.stop(page)

@@ -9,7 +9,6 @@ defmodule Console.PageTest do
 
   doctest Page.Access
   doctest Changes
-  doctest Client
   doctest State
 
   @server (case Application.ensure_all_started(:mochiweb) do
@@ -109,7 +108,6 @@ defmodule Console.PageTest do
 
   describe "in a browser" do
     @describetag skip: @server || Browser.why_not()
-    @describetag timeout: 180_000
 
     defp open(url, size \\ {1280, 800}) do
       browser = Browser.open(size)
@@ -337,7 +335,7 @@ defmodule Console.PageTest do
 
       Browser.await(
         browser,
-        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'idle')"
+        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'E-STOP') && document.getElementById('held').innerText.includes('called by demo: 2 of 2 robots held')"
       )
 
       Browser.run(browser, "location.reload()")
@@ -398,6 +396,73 @@ defmodule Console.PageTest do
       end
 
       Live.Fleet.stop(live)
+    end
+
+    test "what was clicked before the link stood still is not carried out after it; a silent page sends stops alone" do
+      options = options("--robots 1 --landmark none")
+      {:ok, live} = Live.Fleet.start_link(Map.put(Options.trial(options), :mission, false))
+      {page, url} = page(options, Live.Fleet, live)
+      browser = open(url)
+      [%{id: id}] = Live.Fleet.scene(live).robots
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
+      click = &Browser.run(browser, "document.querySelector('#{&1}').click()")
+
+      answered = fn text ->
+        Browser.await(
+          browser,
+          "return document.getElementById('answer').textContent.includes('#{text}')"
+        )
+      end
+
+      # It is heard a second late, and the scenes come all the while.
+      hearer = connection(live)
+      true = :erlang.suspend_process(hearer)
+      click.("#start")
+      Browser.run(browser, "window.clicked = performance.now()")
+      Browser.await(browser, "return performance.now() - window.clicked > 1000")
+      true = :erlang.resume_process(hearer)
+      answered.("and not carried out: at most 0.5 s")
+      assert %{state: :idle} = Swarm.status(id)
+
+      # Words of driving, too: the robot does not move after the hand has let go.
+      click.("#robots button")
+      click.("#drive")
+      true = :erlang.suspend_process(hearer)
+      Browser.key(browser, :keyDown, "w")
+      Browser.run(browser, "window.clicked = performance.now()")
+      Browser.await(browser, "return performance.now() - window.clicked > 400")
+      Browser.key(browser, :keyUp, "w")
+      Browser.run(browser, "window.clicked = performance.now()")
+      Browser.await(browser, "return performance.now() - window.clicked > 400")
+      true = :erlang.resume_process(hearer)
+      click.("#start")
+      answered.("start: accepted")
+      assert %{by: by} = Swarm.status(id)
+      refute by == :move
+
+      # Nothing is heard: the page says so, and holds nothing back for later.
+      feed = Page.Feed.of(page)
+      :ok = :sys.suspend(feed)
+      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
+      click.("#start")
+      answered.("not sent, because the fleet is not heard: start")
+      click.("#estop")
+      answered.("estop: accepted")
+      wait(fn -> Swarm.status(id).estop end)
+      :ok = :sys.resume(feed)
+      Browser.await(browser, "return document.getElementById('fleet').className === ''")
+      assert :ok = Swarm.Case.order(&Swarm.reset/0)
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+      Live.Fleet.stop(live)
+    end
+
+    # The process that hears what the page says.
+    defp connection(live) do
+      [client] = clients(live)
+      {:links, links} = Process.info(client, :links)
+      [hearer] = for pid <- links, is_pid(pid), do: pid
+      hearer
     end
 
     test "a client that is killed while a key is held stops the robot, and the page connects again" do

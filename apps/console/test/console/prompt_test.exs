@@ -59,6 +59,92 @@ defmodule Console.PromptTest do
     assert ok("quit") == :quit
   end
 
+  test "a stop that is typed nearly right stops, and the answer says as what it was taken" do
+    for line <-
+          [
+            "estop all",
+            "estop now",
+            "estop!",
+            "e-stop",
+            "eestop",
+            "E STOP",
+            "emergency stop",
+            "halt",
+            "HALT!!"
+          ] ++
+            [
+              "emergency",
+              "etsop",
+              "estp",
+              "estoppp",
+              "mag1 estop",
+              "all estop",
+              "estop mag9",
+              "halt mag1"
+            ],
+        do: assert({line, ok(line)} == {line, :estop})
+
+    for line <- [
+          "stop all",
+          "stop!",
+          "STOP NOW",
+          "stop all robots",
+          "stpo",
+          "sotp",
+          "stopp",
+          "all stop",
+          "stop, stop"
+        ],
+        do: assert({line, ok(line)} == {line, {:tell, :all, "stop"}})
+
+    assert ok("stop mag1, min1") == {:tell, [:mag1, :min1], "stop"}
+    assert ok("mag2 stop!") == {:tell, [:mag2], "stop"}
+
+    for line <- ["disarm", "disarm all", "disarm now"],
+        do: assert(ok(line) == {:tell, :all, "disarm"})
+
+    assert ok("disarm mag2") == {:tell, [:mag2], "disarm"}
+
+    assert Prompt.said("emergency stop", :estop) == "emergency stop (estop)"
+    assert Prompt.said("stpo", ok("stpo")) == "stpo (stop all)"
+
+    # What cannot be one names what always works; what is like another word is that word.
+    for line <- ["stop mag9", "stop the music", "kill estop", "formation halt", "disarm mag9"],
+        do: assert({line, error(line) =~ "; F8 and estop stop all robots"} == {line, true})
+
+    for {line, command} <- [{"step", {:pace, {:step, 1}}}, {"start", {:tell, :all, "start"}}],
+        do: assert(ok(line) == command)
+
+    assert error("stat") =~ "did you mean"
+    refute error("kil leader") =~ "F8"
+  end
+
+  test "F8 is the emergency stop, at the prompt and while a robot is driven" do
+    press = fn keys, reader ->
+      Enum.map_reduce(keys, reader, fn key, reader ->
+        case reader do
+          %Editor{} -> Editor.key(reader, key)
+          keys -> Console.Teleop.Keys.key(keys, key)
+        end
+      end)
+    end
+
+    f8 = String.graphemes("\e[19~")
+
+    assert {[nil, nil, nil, nil, :estop], %Editor{} = editor} =
+             press.(["\e", "[", "1", "9", "~"], Editor.new([]))
+
+    assert Editor.text(editor) == ""
+    assert {[nil, nil, nil, nil, :estop], keys} = press.(f8, Console.Teleop.Keys.new(:mag1))
+    assert {[{:word, _ahead}], _keys} = press.(["w"], keys)
+    # F5 and F9 are none.
+    for other <- ["\e[15~", "\e[20~"],
+        reader <- [Editor.new([]), Console.Teleop.Keys.new(:mag1)] do
+      {events, _reader} = press.(String.graphemes(other), reader)
+      refute :estop in events
+    end
+  end
+
   test "errors name what is wrong and what is allowed" do
     assert error("kil leader") =~ "did you mean kill?"
 

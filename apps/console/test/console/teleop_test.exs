@@ -138,6 +138,12 @@ defmodule Console.TeleopTest do
       assert {{:word, {0.6, +0.0}}, _keys} = Keys.key(keys, "w")
     end
 
+    # F8, with Shift or without.
+    for f8 <- ["\e[19~", "\e[19;2~"] do
+      {said, _keys} = Enum.map_reduce(String.graphemes(f8), Keys.new(:mag1), &Keys.key(&2, &1))
+      assert List.last(said) == :estop
+    end
+
     # A person who types in the middle of one stands and stops all the same.
     {_said, keys} = Enum.map_reduce(["\e", "["], Keys.new(:mag1), &Keys.key(&2, &1))
     assert {{:word, {+0.0, +0.0}}, _keys} = Keys.key(keys, " ")

@@ -53,6 +53,20 @@ defmodule Console.TerminalTest do
     assert text =~ "Try:  kill leader"
   end
 
+  test "an emergency stop is the first line of every view, and each robot that it holds says so" do
+    scene = Runs.scene("", 12)
+    held = Enum.map(scene.robots, &%{&1 | state: :estop})
+    stop = %{held: Enum.map(held, & &1.id), of: 6, since_ms: scene.at_ms - 5_000, by: ["base"]}
+    scene = %{scene | robots: held, estop: stop}
+    told = "EMERGENCY STOP for 5 s, called by base: 6 of 6 robots held; reset frees them"
+    [first | rest] = screen(scene, 80, 24)
+    assert String.trim(first) == told
+    assert Enum.count(rest, &(&1 =~ ~r/(mag|min)\d +E-STOP/)) == 6
+    assert hd(Console.Cli.Format.everybody(scene)) == told
+    assert Console.Cli.Format.status(scene) =~ told
+    assert Console.Page.State.scene(scene, nil, nil, 0) =~ told
+  end
+
   test "dead robots are shown where they lie" do
     text = "--kill mag2@3" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
     assert text =~ "✗"

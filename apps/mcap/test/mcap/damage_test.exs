@@ -86,7 +86,6 @@ defmodule Mcap.DamageTest do
     end
 
     @tag :long
-    @tag timeout: 600_000
     test "never crashes, very often", %{tmp_dir: dir} do
       for seed <- 1..10, do: survive(dir, 1000, seed)
     end

@@ -100,7 +100,7 @@ defmodule Mesh.Protocol do
     protocol = Rejections.tick(protocol, now_ms)
 
     case Packet.Filter.read(protocol, datagram, address) do
-      {:ok, packet, node, body} -> Admission.admit(protocol, packet, node, body, address, now_ms)
+      {:ok, packet, body} -> Admission.admit(protocol, packet, body, address, now_ms)
       {:error, :own} -> {protocol, []}
       {:error, reason} -> Rejections.reject(protocol, reason, address)
     end

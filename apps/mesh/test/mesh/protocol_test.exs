@@ -198,23 +198,49 @@ defmodule Mesh.ProtocolTest do
     refute Enum.any?(changes(air, "a"), &match?({_, :gone, _}, &1))
   end
 
-  test "names that are not in the fleet are counted, told of, and never become atoms" do
+  test "names that cannot be let in are counted and told of; no name becomes an atom before it was shown to be fresh" do
     air = Air.new() |> Air.join("a") |> Air.join("b") |> Air.run(1_000) |> Map.put(:out, [])
-    names = for n <- 1..50, do: "rover#{n}_#{:rand.uniform(1_000_000_000)}@lab"
+    address = {{10, 0, 0, 99}, 4370}
 
-    air =
+    say = fn names, air ->
       Enum.reduce(names, air, fn name, air ->
-        address = {{10, 0, 0, 99}, 4370}
         packet = packet(air, "b", 1, :beacon, Packet.pack({[], [], 0}))
         inject(air, "a", %{packet | sender: name, addresses: [address]}, address)
       end)
+    end
+
+    strange = for n <- 1..50, do: "Rover#{n}_#{:rand.uniform(1_000_000_000)}@lab"
+    air = say.(strange, air)
+    assert air.stations["a"].rejected.unknown_node == 50
+    assert [{_, "a", {:event, :unknown_node, %{name: "Rover1_" <> _}}}] = air.out
+
+    # Signed once, and recorded perhaps: who says this now is asked first.
+    guests = for n <- 1..50, do: "rover#{n}_#{:rand.uniform(1_000_000_000)}@lab"
+    air = say.(guests, air)
+    assert air.stations["a"].rejected.unknown_node == 50
 
     # Of these names, not of all: other tests make atoms meanwhile.
-    for name <- names,
+    for name <- strange ++ guests,
         do: assert_raise(ArgumentError, fn -> String.to_existing_atom(name) end)
+  end
 
-    assert air.stations["a"].rejected.unknown_node == 50
-    assert [{_, "a", {:event, :unknown_node, %{name: "rover1_" <> _}}}] = air.out
+  test "a node with the secret is let in by any name, and so many of them" do
+    air = Air.new() |> Air.join("a") |> Air.join("laptop") |> Air.run(1_000)
+
+    assert {"a", :up, :laptop@lab} in Enum.map(changes(air, "a"), fn {_ms, change, node} ->
+             {"a", change, node}
+           end)
+
+    assert {"b", :up, :a@lab} in Enum.map(changes(air, "laptop"), fn {_ms, change, node} ->
+             {"b", change, node}
+           end)
+
+    air = Enum.reduce(1..70, air, &Air.join(&2, "guest#{&1}"))
+    air = Air.run(air, 3_000)
+    a = air.stations["a"]
+    assert a.roster.guests == 64
+    assert map_size(a.node_table.nodes) == 64
+    assert a.rejected.unknown_node > 0
   end
 
   test "random, cut, and turned-over datagrams are counted and change nothing" do

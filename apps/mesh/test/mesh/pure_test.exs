@@ -5,6 +5,7 @@ defmodule Mesh.PureTest do
   alias Mesh.Distribution.Access.Networks
   alias Mesh.Distribution.Topology
 
+  doctest Mesh.Environment
   doctest Mesh.Backoff
   doctest Mesh.Fault
   doctest Mesh.Interface

@@ -17,6 +17,7 @@ defmodule Sim.Scene do
                 formation: {:column, 1.0},
                 error: nil,
                 formed?: false,
+                estop: nil,
                 stages: []
               ]
 
@@ -60,8 +61,39 @@ defmodule Sim.Scene do
           formation: {atom(), float()},
           error: {mean :: float(), max :: float()} | nil,
           formed?: boolean(),
+          estop: estop() | nil,
           stages: [stage()]
         }
+
+  @typedoc """
+  An emergency stop that holds robots of the fleet: which ones, of how many, since when (`at_ms`), and the names of
+  those that called it, as far as the robots know.
+  """
+  @type estop :: %{
+          held: [atom(), ...],
+          of: non_neg_integer(),
+          since_ms: integer(),
+          by: [String.t()]
+        }
+
+  @doc """
+  The emergency stop after one look at the fleet, of which these robots are held; `before` is that of the look before.
+
+      iex> Sim.Scene.estop(nil, [], 2, 100)
+      nil
+      iex> stop = Sim.Scene.estop(nil, [mag1: ["base"]], 2, 100)
+      iex> Sim.Scene.estop(stop, [mag1: ["base"], mag2: []], 2, 200)
+      %{held: [:mag1, :mag2], of: 2, since_ms: 100, by: ["base"]}
+  """
+  @spec estop(estop() | nil, [{atom(), callers :: [String.t()]}], non_neg_integer(), integer()) ::
+          estop() | nil
+  def estop(_before, [], _of, _at_ms), do: nil
+
+  def estop(before, held, of, at_ms) do
+    {robots, callers} = Enum.unzip(held)
+    since_ms = if before, do: before.since_ms, else: at_ms
+    %{held: robots, of: of, since_ms: since_ms, by: callers |> Enum.concat() |> Enum.uniq()}
+  end
 
   @doc """
   How far a robot is from its slot, in metres; `nil` for a robot without a slot.

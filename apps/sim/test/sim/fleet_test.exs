@@ -97,12 +97,21 @@ defmodule Sim.FleetTest do
       end)
     end)
 
+    # Whoever looks sees that they are held, and by whom.
+    eventually(fn -> match?(%{held: ^ids, of: 3}, Fleet.scene(fleet).estop) end)
+    assert %{estop: %{by: ["this program"]}, robots: robots} = Fleet.scene(fleet)
+    assert Enum.map(robots, & &1.state) == [:estop, :estop, :estop]
+    assert List.last(stages(fleet)) == :estop_holds
+
     before = still.()
     assert order(fn -> Swarm.stop(hd(ids)) end) == :ok
     assert {:error, line} = Swarm.start(robots: [hd(ids)])
     assert line =~ "emergency stop"
     assert still.() == before
     assert order(fn -> Swarm.reset() end) == :ok
+
+    eventually(fn -> Fleet.scene(fleet).estop == nil end)
+    assert List.last(stages(fleet)) == :estop_over
 
     # Their missions ended with the stop; they start again.
     eventually(fn -> Fleet.scene(fleet).leader == nil end)

@@ -4,7 +4,6 @@ defmodule Sim.FreezeTest do
   alias Sim.Fleet
   @moduletag :long
   @moduletag :capture_log
-  @moduletag timeout: 600_000
 
   @ids [:mag1, :mag2, :min1, :min2]
   @freezes 30

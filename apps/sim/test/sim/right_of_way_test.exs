@@ -58,7 +58,6 @@ defmodule Sim.RightOfWayTest do
   end
 
   @tag long: true
-  @tag timeout: 600_000
   test "all arrive, by ten seeds; of the three in the door in nine" do
     {door, corridors} = List.pop_at(@cases, -1)
     for one <- corridors, do: all_arrive(one, 1..10)

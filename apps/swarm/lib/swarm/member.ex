@@ -200,6 +200,11 @@ defmodule Swarm.Member do
   @spec claim(t()) :: map()
   def claim(member), do: member.runner.claim
 
+  @doc "Who called the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
+  @spec held(t()) :: [String.t()] | nil
+  def held(member),
+    do: if(EStop.State.held?(member.stop), do: EStop.State.callers(member.stop))
+
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
   def stands?(member), do: Runner.state(member.runner) == :idle or member.controller.tag == :stand

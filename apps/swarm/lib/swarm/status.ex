@@ -13,6 +13,8 @@ defmodule Swarm.Status do
   (`by`) first; `way` are the corners of the way that it takes round what stands about, the goal last, in the frame of its
   pose. A row has neither.
 
+  A robot that the emergency stop holds is `E-STOP`, with the nodes that called it as far as it knows (`estop_by`).
+
   If the wheels may not turn, it says `DISARMED`, with what is missing, or `LINE LOST` until a
   person acknowledges (`Hal.Device.Arming`; `arming` and `why`). For a device that is offline it
   says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
@@ -47,6 +49,7 @@ defmodule Swarm.Status do
   alias Hal.{Odometry, Pose, Twist}
   alias Robot.Board
   alias Robot.Safety.LivenessMonitor
+  alias Swarm.EStop
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
   alias Swarm.Status.Frame
@@ -68,6 +71,7 @@ defmodule Swarm.Status do
                 speed: 0.0,
                 limits: [],
                 estop: false,
+                estop_by: [],
                 arming: nil,
                 why: nil,
                 hung: nil,
@@ -103,6 +107,7 @@ defmodule Swarm.Status do
           speed: float() | nil,
           limits: [atom() | String.t()],
           estop: boolean(),
+          estop_by: [String.t()],
           arming: Hal.Device.Arming.state() | nil,
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
@@ -148,6 +153,7 @@ defmodule Swarm.Status do
       limits:
         (entries |> value(:doing) |> field(:limits) || []) ++ (field(driving, :limits) || []),
       estop: Board.latched?(board),
+      estop_by: entries |> value(:estop) |> callers(),
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
@@ -174,6 +180,9 @@ defmodule Swarm.Status do
       age_ms: age(entries)
     }
   end
+
+  defp callers(nil), do: []
+  defp callers(stop), do: EStop.State.callers(stop)
 
   defp words(config, device, reason),
     do: config |> Map.fetch!(device) |> Words.offline(reason)
@@ -249,7 +258,7 @@ defmodule Swarm.Status do
       dropped = status.rejected |> Map.values() |> Enum.sum()
 
       [
-        status.estop && "E-STOP",
+        status.estop && "E-STOP" <> by(status.estop_by),
         Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
         limited?(status, "blind") && "BLIND (no sonar; slow)",
@@ -268,6 +277,9 @@ defmodule Swarm.Status do
       |> Enum.filter(& &1)
       |> Kernel.++(offline)
     end
+
+    defp by([]), do: ""
+    defp by(callers), do: " by #{Enum.join(callers, ", ")}"
 
     defp limited?(status, limit), do: Enum.any?(status.limits, &("#{&1}" == limit))
 

@@ -43,7 +43,7 @@ defmodule Vision.BlobsTest do
       for size <- ["32x24", "64x36"] do
         file = Path.join(folder, "#{size}.ts")
         source = "color=color=0xDCCD5A:size=#{size}:rate=10:duration=1"
-        arguments = ~w(-v error -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts #{file})
+        arguments = ~w(-v error -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts) ++ [file]
         {"", 0} = System.cmd("ffmpeg", arguments, stderr_to_stdout: true)
         File.read!(file)
       end

@@ -54,6 +54,14 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :given_up, robot: robot, x: x, y: y, blocked_by: why}),
     do: "#{robot} gives up its way to #{x},#{y}: blocked by #{why}"
 
+  def meaning(%{stage: :estop_holds, by: []}),
+    do: "the emergency stop holds robots, until a reset"
+
+  def meaning(%{stage: :estop_holds, by: by}),
+    do: "the emergency stop of #{Enum.join(by, ", ")} holds robots, until a reset"
+
+  def meaning(%{stage: :estop_over}), do: "no robot is held any more; they stand until a start"
+
   def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
   def meaning(%{stage: :landmark_moved}), do: "the landmark starts to move"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
@@ -61,7 +69,10 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :world_lost}),
     do: "the world has ended; robots stand still, it is started again"
 
-  def meaning(%{stage: :world_back}), do: "the world goes on where it was"
+  def meaning(%{stage: :world_back}),
+    do:
+      "the world goes on where it was; robots whose wheels fell silent stand, idle, until a start"
+
   def meaning(%{stage: :lost} = stage), do: "#{subject(stage)} has lost the landmark"
 
   def meaning(%{stage: :refused, robot: robot, from: from, epoch: epoch}),
@@ -80,6 +91,34 @@ defmodule Console.Cli.Format do
     do: String.replace(@done[stage], "ROBOT", "#{robot}")
 
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
+
+  @doc """
+  The emergency stop that holds robots, in one line for every view; `nil` if none does.
+
+      iex> stop = %{held: [:mag1, :mag2], of: 3, since_ms: 2_000, by: ["base"]}
+      iex> robots = [%{id: :mag3, alive: true}]
+      iex> Console.Cli.Format.estop(%Sim.Scene{at_ms: 14_000, map: nil, robots: robots, estop: stop})
+      "EMERGENCY STOP for 12 s, called by base: 2 of 3 robots held (not mag3); reset frees them"
+  """
+  @spec estop(Sim.Scene.t()) :: String.t() | nil
+  def estop(%{estop: nil}), do: nil
+
+  def estop(%{estop: stop} = scene) do
+    by = if stop.by == [], do: "", else: ", called by #{Enum.join(stop.by, ", ")}"
+    held = "#{length(stop.held)} of #{count(stop.of, "robot")} held#{free(scene.robots, stop)}"
+    "EMERGENCY STOP for #{duration(scene.at_ms - stop.since_ms)}#{by}: #{held}; reset frees them"
+  end
+
+  # Those that still drive are the news.
+  defp free(robots, stop) do
+    case for(%{alive: true, id: id} <- robots, id not in stop.held, do: id) do
+      [] -> ""
+      free -> " (not #{Enum.join(free, ", ")})"
+    end
+  end
+
+  defp duration(ms) when ms < 120_000, do: "#{div(ms, 1_000)} s"
+  defp duration(ms), do: "#{div(ms, 60_000)} min"
 
   defp told({:start, module, _options}), do: "to start #{Swarm.Missions.name(module)}"
   defp told({:formation, kind, spacing}), do: "to form a #{kind} with #{decimals(spacing, 1)} m"
@@ -116,13 +155,13 @@ defmodule Console.Cli.Format do
     living = Enum.count(scene.robots, & &1.alive)
     sight = Enum.count(scene.robots, &(&1.alive and &1.size_ppm != nil))
 
-    String.pad_leading(decimals(scene.at_ms / 1000, 1), 7) <>
-      " s  #{count(living, "robot")}, #{sight} with the landmark in sight, #{leader(scene)}"
+    doing = "#{count(living, "robot")}, #{sight} with the landmark in sight, #{leader(scene)}"
+    String.pad_leading(decimals(scene.at_ms / 1000, 1), 7) <> " s  #{estop(scene) || doing}"
   end
 
   @doc "All robots, each in a line of its own."
   @spec everybody(Sim.Scene.t()) :: [String.t()]
-  def everybody(scene), do: Enum.map(scene.robots, &robot/1)
+  def everybody(scene), do: List.wrap(estop(scene)) ++ Enum.map(scene.robots, &robot/1)
 
   @doc "One robot in one line."
   @spec one(Sim.Scene.t(), atom()) :: [String.t()]
@@ -150,6 +189,7 @@ defmodule Console.Cli.Format do
     "#{robot.id}: #{state(robot)}#{role} at #{pose(robot.pose)}#{doubt}#{slot}#{sight}"
   end
 
+  defp state(%{state: :estop}), do: "held by the emergency stop"
   defp state(%{state: :unsure}), do: "in its slot, but not sure of its place,"
   defp state(%{state: state}), do: state
 

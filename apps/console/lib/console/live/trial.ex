@@ -11,6 +11,7 @@ defmodule Console.Live.Trial do
   alias Console.Cli.Format
   alias Console.Live.Pace
   alias Console.Page.About
+  alias Console.Prompt
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
   alias Swarm.Missions.Text
@@ -39,7 +40,10 @@ defmodule Console.Live.Trial do
   def scene(live), do: GenServer.call(live, :scene, :infinity)
 
   @impl Console.Live
-  def command(live, command), do: GenServer.call(live, {:command, command}, :infinity)
+  def command(live, command) do
+    given_us = Swarm.Commands.Client.given_us()
+    GenServer.call(live, {:command, command, given_us}, :infinity)
+  end
 
   # In lockstep nothing can be killed from outside.
   @impl Console.Live
@@ -80,7 +84,8 @@ defmodule Console.Live.Trial do
       pace: pace,
       recorder: recorder,
       tick: 0,
-      due_ms: Hal.Clock.now_ms()
+      due_ms: Hal.Clock.now_ms(),
+      stopped_us: nil
     }
 
     {:ok, schedule(s, s.due_ms)}
@@ -98,7 +103,7 @@ defmodule Console.Live.Trial do
 
   def handle_call(:pace, _from, state), do: {:reply, Pace.words(state.pace), state}
 
-  def handle_call({:command, {:pace, command}}, _from, state) do
+  def handle_call({:command, {:pace, command}, _given_us}, _from, state) do
     case Pace.command(state.pace, command) do
       {:ok, pace} ->
         {:reply, {:ok, Pace.words(pace)}, schedule(%{state | pace: pace}, Hal.Clock.now_ms())}
@@ -108,10 +113,20 @@ defmodule Console.Live.Trial do
     end
   end
 
-  def handle_call({:command, command}, _from, state) do
-    case carry_out(command, state) do
-      {:ok, trial} -> {:reply, {:ok, "done"}, %{state | trial: trial}}
-      {:error, line} -> {:reply, {:error, line}, state}
+  # As robots of their own do it, a run refuses what was ordered before it was stopped.
+  def handle_call({:command, command, given_us}, _from, state) do
+    stop? = Prompt.kind(command) == :stop
+
+    with true <- stop? or state.stopped_us == nil or given_us >= state.stopped_us,
+         {:ok, trial} <- carry_out(command, state) do
+      stopped_us = if stop?, do: System.monotonic_time(:microsecond), else: state.stopped_us
+      {:reply, {:ok, "done"}, %{state | trial: trial, stopped_us: stopped_us}}
+    else
+      false ->
+        {:reply, {:error, "they were stopped after this command was given; repeat it"}, state}
+
+      {:error, line} ->
+        {:reply, {:error, line}, state}
     end
   end
 
@@ -172,7 +187,13 @@ defmodule Console.Live.Trial do
 
   defp carry_out({:tell, target, "stop"}, state), do: tell(target, :stop, state)
   defp carry_out({:tell, target, "start"}, state), do: tell(target, :start, state)
-  defp carry_out(latch, state) when latch in [:estop, :reset], do: tell(:all, latch, state)
+  defp carry_out(:reset, state), do: tell(:all, :reset, state)
+
+  # One call for all.
+  defp carry_out(:estop, state) do
+    at_ms = state.module.scene(state.trial).at_ms
+    tell(:all, {:estop, {:demo, 0, at_ms}}, state)
+  end
 
   defp carry_out({:tell, target, "start:" <> text}, %{module: module, trial: trial} = state) do
     with {:ok, {mission, options}} <- Text.read(text, length(module.living(trial))),

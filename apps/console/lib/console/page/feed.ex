@@ -74,7 +74,8 @@ defmodule Console.Page.Feed do
 
   def handle_info(:tick, s) do
     scene = s.module.scene(s.live)
-    json = State.scene(scene, s.module.pace(s.live), s.module.notice(s.live))
+    {pace, notice} = {s.module.pace(s.live), s.module.notice(s.live)}
+    json = State.scene(scene, pace, notice, Hal.Clock.now_ms())
     for pusher <- s.waiting, do: send(pusher, {:scene, json})
     s = %{s | scene: scene, changes: Changes.note(s.changes, scene)}
     {:noreply, tick(%{s | waiting: [], ticking?: false})}

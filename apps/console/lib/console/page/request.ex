@@ -1,12 +1,12 @@
 defmodule Console.Page.Request do
   @moduledoc false
   # Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
-  # scenes as JSON and says its lines (`Console.Page.Client`). Runs in mochiweb's processes, one a connection.
+  # scenes as JSON and says its lines (`Console.Page.Line`). Runs in mochiweb's processes, one a connection.
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_socket, :mochiweb_websocket]}
   alias Console.Page
-  alias Console.Page.{About, Client, Door, Feed, State}
-  alias Console.Prompt
+  alias Console.Page.{About, Client, Door, Feed, Line, State}
+  alias Console.{Orders, Prompt}
 
   @folder Path.expand("../../../priv/page", __DIR__)
   @types %{
@@ -128,10 +128,12 @@ defmodule Console.Page.Request do
     {reentry, reply} = :mochiweb_websocket.upgrade_connection(request, &hear/3)
     Door.note(door, :live)
     reply.(Feed.map(feed))
-    {:ok, client} = Client.start_link(feed, robots, reply)
+    {:ok, client} = Client.start_link(feed, reply)
+    {:ok, orders} = Orders.start_link(&reply.(State.answer(&1, &2)))
     ping = fn -> :mochiweb_socket.send(socket, @ping) end
     _pusher = spawn_link(fn -> push(feed, reply, ping) end)
-    reentry.(%{client: client, source: Feed.source(feed), door: door})
+    source = Feed.source(feed)
+    reentry.(%{client: client, orders: orders, robots: robots, source: source, door: door})
   end
 
   # Ends with the connection, and the connection with the feed: the page then says that what it shows is old, and asks
@@ -167,26 +169,26 @@ defmodule Console.Page.Request do
     s
   end
 
-  # An emergency stop waits for no order before it.
-  defp line("estop", %{source: {module, live}}, reply),
-    do: reply.(State.answer("estop", module.command(live, :estop)))
+  # A line is heard here, and what it orders waits elsewhere, so that a stop waits for nothing.
+  defp line("", _s, _reply), do: :ok
 
-  defp line(line, s, reply) do
-    cond do
-      byte_size(line) > Prompt.most_bytes() or not String.printable?(line) ->
-        reply.(
-          State.answer(
-            "",
-            {:error, "this is no line of text of at most #{Prompt.most_bytes()} bytes"}
-          )
-        )
+  defp line(text, s, reply) do
+    heard_us = System.monotonic_time(:microsecond)
 
-      line == "" ->
-        :ok
-
-      true ->
-        Client.obey(s.client, line)
+    with :ok <- readable(text),
+         {line, given_us} = Line.given(text, heard_us),
+         {:ok, order} <- Line.order(line, given_us, s.robots.(), s.source) do
+      Orders.give(s.orders, %{order | given_us: given_us || heard_us})
+    else
+      {:look, robot} -> Client.look(s.client, robot)
+      {:error, _line} = error -> reply.(State.answer("", error))
     end
+  end
+
+  defp readable(text) do
+    if byte_size(text) <= Line.most_bytes() and String.printable?(text),
+      do: :ok,
+      else: {:error, "this is no line of text of at most #{Prompt.most_bytes()} bytes"}
   end
 
   defp say(request, status, line),

@@ -55,13 +55,15 @@ defmodule Console.Page.State do
 
   @doc """
   The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
-  robot of a real fleet may have no known pose. Only robots of one `frame` are drawn together; `apart` says why one is not
+  robot of a real fleet may have no known pose. `now_ms` is the time of this node (`System.monotonic_time/1`), by which the
+  page says when an order was given. Only robots of one `frame` are drawn together; `apart` says why one is not
   in that of most.
   """
-  @spec scene(Scene.t(), String.t() | nil, String.t() | nil) :: String.t()
-  def scene(%Scene{} = scene, pace, notice) do
+  @spec scene(Scene.t(), String.t() | nil, String.t() | nil, now_ms :: integer()) :: String.t()
+  def scene(%Scene{} = scene, pace, notice, now_ms) do
     Json.encode!(%{
       t: "scene",
+      now: now_ms,
       at_s: scene.at_ms / 1000,
       pace: pace,
       notice: notice,
@@ -70,6 +72,7 @@ defmodule Console.Page.State do
       formation: scene.formation && Tuple.to_list(scene.formation),
       error: scene.error && Enum.map(Tuple.to_list(scene.error), &round3/1),
       formed: scene.formed?,
+      estop: Format.estop(scene),
       landmark: point(scene.landmark),
       robots: Enum.map(scene.robots, &robot/1),
       told: told(scene.stages),
@@ -93,7 +96,7 @@ defmodule Console.Page.State do
       a: robot.pose && round3(robot.pose.heading),
       r: robot.radius,
       alive: robot.alive,
-      state: robot.state,
+      state: shown(robot.state),
       slot: point(robot.slot),
       off: robot.slot && round3(Scene.slot_error(robot)),
       unsure: round3(robot.uncertainty),
@@ -103,6 +106,9 @@ defmodule Console.Page.State do
       apart: robot[:apart]
     }
   end
+
+  defp shown(:estop), do: "E-STOP"
+  defp shown(state), do: state
 
   defp stage(stage),
     do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage), robot: stage[:robot]}

@@ -9,7 +9,7 @@ defmodule Console.Teleop.Keys do
   | `a`, left; `d`, right | turns |
   | `+`, `-` | faster, slower |
   | space | stands |
-  | `e` | emergency stop of all robots |
+  | `e`, F8 | emergency stop of all robots |
   | `q`, Enter, Ctrl-C | drives no more |
   """
 
@@ -20,7 +20,6 @@ defmodule Console.Teleop.Keys do
   @arrows %{"A" => "w", "B" => "s", "C" => "d", "D" => "a"}
   # After `\e[`, up to the letter or `~` that ends it; the second bracket is of the Linux console's F1 to F5.
   @parameters Enum.map(?0..??, &<<&1>>) ++ ["["]
-  @other "\e[;"
 
   @enforce_keys [:robot]
   defstruct @enforce_keys ++ [share: @first, escape: ""]
@@ -64,13 +63,17 @@ defmodule Console.Teleop.Keys do
 
   def key(%{escape: escape} = keys, char) do
     cond do
-      escape != @other and is_map_key(@arrows, char) -> said(keys, @arrows[char])
+      escape in ["\e[", "\eO"] and is_map_key(@arrows, char) -> said(keys, @arrows[char])
       # Parameters: another key, or an arrow with a modifier.
-      escape != "\eO" and char in @parameters -> {nil, %{keys | escape: @other}}
+      escape != "\eO" and char in @parameters -> {nil, %{keys | escape: longer(escape, char)}}
+      char == "~" and escape =~ ~r/^\e\[19(;|$)/ -> said(keys, "e")
       # The end of another key: F4 ends with S, Ctrl and left with D.
       true -> {nil, %{keys | escape: ""}}
     end
   end
+
+  # No key has more.
+  defp longer(escape, char), do: if(byte_size(escape) < 16, do: escape <> char, else: escape)
 
   defp said(%{share: share} = keys, char) do
     keys = %{keys | escape: ""}

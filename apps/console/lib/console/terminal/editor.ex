@@ -17,8 +17,8 @@ defmodule Console.Terminal.Editor do
   @type t :: %__MODULE__{}
 
   @doc """
-  Handles one character. Besides the editor it returns a finished line, the wish to leave, or the
-  possible completions of the word at the cursor.
+  Handles one character. Besides the editor it returns a finished line, the wish to leave, the emergency stop (F8), or
+  the possible completions of the word at the cursor.
 
       iex> editor = Console.Terminal.Editor.new(["kill"])
       iex> {nil, editor} = Console.Terminal.Editor.key(editor, "k")
@@ -30,7 +30,7 @@ defmodule Console.Terminal.Editor do
       {:line, "kill "}
   """
   @spec key(t(), String.t()) ::
-          {nil | {:line, String.t()} | {:choices, [String.t()]} | :quit, t()}
+          {nil | {:line, String.t()} | {:choices, [String.t()]} | :quit | :estop, t()}
   def key(%__MODULE__{escape: nil} = editor, "\e"), do: {nil, %{editor | escape: ""}}
 
   def key(%__MODULE__{escape: escape} = editor, char) when is_binary(escape) do
@@ -40,6 +40,9 @@ defmodule Console.Terminal.Editor do
 
       "O" ->
         {nil, %{editor | escape: "["}}
+
+      "[19~" ->
+        {:estop, %{editor | escape: nil}}
 
       "[" <> rest = sequence ->
         if rest =~ ~r/[A-Za-z~]$/,

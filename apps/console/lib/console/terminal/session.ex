@@ -3,9 +3,9 @@ defmodule Console.Terminal.Session do
   # Shows a live fleet to a person: full screen on a terminal, plain lines elsewhere.
   #
   # One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
-  # decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Live`
-  # acts.
-  alias Console.{Demo, Options, Page, Picture, Report, Teleop, Terminal}
+  # decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Orders` has
+  # orders carried out.
+  alias Console.{Demo, Options, Orders, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Console.Prompt
@@ -17,7 +17,7 @@ defmodule Console.Terminal.Session do
   @key_ms 20
   @status_s 5
 
-  @enforce_keys [:module, :live, :robots, :until_s, :mode, :output]
+  @enforce_keys [:module, :live, :orders, :robots, :until_s, :mode, :output]
   defstruct @enforce_keys ++
               [
                 view: nil,
@@ -62,10 +62,13 @@ defmodule Console.Terminal.Session do
     mode = if tty == :error, do: :lines, else: :screen
     reader = spawn_link(reader(mode, self()))
     scene = module.scene(live)
+    me = self()
+    {:ok, orders} = Orders.start_link(&send(me, {:answer, &1, &2}))
 
     session = %__MODULE__{
       module: module,
       live: live,
+      orders: orders,
       robots: options.robots,
       scene: scene,
       until_s: until_s,
@@ -89,7 +92,17 @@ defmodule Console.Terminal.Session do
     session = loop(session)
     Process.unlink(reader)
     Process.exit(reader, :kill)
-    session
+    :ok = Orders.settle(orders)
+    answers(session)
+  end
+
+  # What was ordered before the end is answered before it.
+  defp answers(session) do
+    receive do
+      {:answer, line, answer} -> session |> answered(line, answer) |> answers()
+    after
+      0 -> session
+    end
   end
 
   # The page is a second view; without it the demo goes on.
@@ -123,7 +136,7 @@ defmodule Console.Terminal.Session do
   defp keys(session) do
     case IO.getn("", 1) do
       key when is_binary(key) ->
-        send(session, {:key, key})
+        send(session, {:key, key, now_us()})
         keys(session)
 
       _closed ->
@@ -134,7 +147,7 @@ defmodule Console.Terminal.Session do
   defp lines(session) do
     case IO.gets("") do
       line when is_binary(line) ->
-        send(session, {:line, line})
+        send(session, {:line, line, now_us()})
         lines(session)
 
       _closed ->
@@ -142,9 +155,9 @@ defmodule Console.Terminal.Session do
     end
   end
 
-  defp loop(session) do
-    live = session.live
+  defp now_us, do: System.monotonic_time(:microsecond)
 
+  defp loop(%{live: live, orders: orders} = session) do
     receive do
       :draw ->
         scene = session.module.scene(live)
@@ -163,15 +176,18 @@ defmodule Console.Terminal.Session do
             loop(session)
         end
 
-      {:key, key} ->
-        session |> key(key) |> continue()
+      {:key, key, given_us} ->
+        session |> key(key, given_us) |> continue()
 
       # Draws the scene at hand, because typing must not wait for the fleet.
       :redraw ->
         loop(draw(%{session | redraw?: false}, session.scene))
 
-      {:line, line} ->
-        session |> obey(line) |> continue()
+      {:line, line, given_us} ->
+        session |> obey(line, given_us) |> continue()
+
+      {:answer, line, answer} ->
+        session |> answered(line, answer) |> redraw() |> continue()
 
       {:gamepad, line} ->
         session |> answer(line, :bad) |> continue()
@@ -181,6 +197,9 @@ defmodule Console.Terminal.Session do
 
       {:EXIT, ^live, reason} ->
         exit({:fleet_died, reason})
+
+      {:EXIT, ^orders, reason} ->
+        exit({:orders_died, reason})
 
       {:EXIT, pad, _reason} when pad == session.gamepad ->
         loop(%{session | gamepad: nil})
@@ -194,40 +213,42 @@ defmodule Console.Terminal.Session do
   defp continue(session), do: loop(session)
 
   # While a robot is driven its keys are no text.
-  defp key(%{keys: %Teleop.Keys{}} = session, key) do
+  defp key(%{keys: %Teleop.Keys{}} = session, key, given_us) do
     {event, keys} = Teleop.Keys.key(session.keys, key)
     session = drive(session, keys)
 
     case event do
       nil -> session
       :speed -> redraw(session)
-      :estop -> session |> drive(nil) |> obey("estop") |> redraw()
-      :leave -> session |> drive(nil) |> word(keys.robot, {0.0, 0.0}) |> redraw()
-      {:word, stick} -> session |> word(keys.robot, stick) |> redraw()
+      :estop -> session |> drive(nil) |> obey("estop", given_us) |> redraw()
+      :leave -> session |> drive(nil) |> word(keys.robot, {0.0, 0.0}, given_us) |> redraw()
+      {:word, stick} -> session |> word(keys.robot, stick, given_us) |> redraw()
     end
   end
 
-  defp key(session, key) do
+  defp key(session, key, given_us) do
     {event, editor} = Editor.key(session.view.editor, key)
     session = put_in(session.view.editor, editor)
 
     case event do
       nil -> redraw(session)
       :quit -> {:quit, session}
+      :estop -> session |> obey("estop", given_us) |> redraw()
       {:choices, words} -> session |> answer(Enum.join(words, "  "), :dim) |> redraw()
-      {:line, line} -> %{session | view: %{session.view | overlay: nil}} |> obey(line) |> redraw()
+      {:line, line} -> session |> entered(line, given_us) |> redraw()
     end
   end
+
+  defp entered(session, line, given_us),
+    do: obey(%{session | view: %{session.view | overlay: nil}}, line, given_us)
 
   defp drive(session, keys),
     do: put_in(%{session | keys: keys}.view.driving, keys && Teleop.Keys.hint(keys))
 
-  # Only a refusal is told: words come ten times a second.
-  defp word(session, robot, stick) do
-    case session.module.command(session.live, Teleop.order(robot, stick, :terminal)) do
-      {:ok, _accepted} -> session
-      {:error, line} -> answer(session, line, :bad)
-    end
+  defp word(session, robot, stick, given_us) do
+    order = Orders.of_word(robot, stick, :terminal, {session.module, session.live}, given_us)
+    Orders.give(session.orders, order)
+    session
   end
 
   defp gamepad(%{gamepad: pad} = session, :off) do
@@ -247,6 +268,7 @@ defmodule Console.Terminal.Session do
   end
 
   defp redraw({:quit, session}), do: {:quit, session}
+  defp redraw(%{mode: :lines} = session), do: session
   defp redraw(%{redraw?: true} = session), do: session
 
   defp redraw(session) do
@@ -281,7 +303,7 @@ defmodule Console.Terminal.Session do
   defp track(%{track: nil} = session, _scene), do: session
   defp track(session, scene), do: %{session | track: RunTrack.add(session.track, scene)}
 
-  defp obey(session, line) do
+  defp obey(session, line, given_us) do
     case Prompt.parse(line, session.robots) do
       {:ok, :nothing} ->
         session
@@ -314,19 +336,17 @@ defmodule Console.Terminal.Session do
         show(session, Format.one(session.module.scene(session.live), name))
 
       {:ok, command} ->
-        act(session, String.trim(line), command)
+        source = {session.module, session.live}
+        Orders.give(session.orders, Orders.of_line(line, command, source, given_us))
+        session
 
       {:error, error} ->
         answer(session, error, :bad)
     end
   end
 
-  defp act(session, line, command) do
-    case session.module.command(session.live, command) do
-      {:ok, text} -> answer(session, "#{line}: #{text}", :good)
-      {:error, error} -> answer(session, error, :bad)
-    end
-  end
+  defp answered(session, line, {:ok, text}), do: answer(session, "#{line}: #{text}", :good)
+  defp answered(session, _line, {:error, error}), do: answer(session, error, :bad)
 
   defp answer(%{mode: :lines} = session, text, _style) do
     Output.line(session.output, text)

@@ -17,6 +17,7 @@ defmodule Console.Terminal.Style do
     dim: "38;5;245",
     good: "38;5;42",
     bad: "1;38;5;203",
+    alarm: "1;97;41",
     unsure: "38;5;220",
     prompt: "1;38;5;208"
   }
@@ -50,7 +51,7 @@ defmodule Console.Terminal.Style do
 
   defp filling(parts) do
     case List.last(parts) do
-      {_text, style} when style in [:title, :bar] -> style
+      {_text, style} when style in [:title, :bar, :alarm] -> style
       _other -> :plain
     end
   end

@@ -55,6 +55,7 @@ defmodule Console.Terminal.Table do
 
   defp does(%{alive: false}), do: "dead"
   defp does(%{state: :unsure}), do: "not sure"
+  defp does(%{state: :estop}), do: "E-STOP"
   defp does(robot), do: robot.state |> Atom.to_string() |> String.slice(0, 8)
 
   defp off(robot) do
@@ -93,7 +94,7 @@ defmodule Console.Terminal.Table do
   defp name(_robot), do: :name
 
   defp state(%{alive: false}), do: :dead
-  defp state(%{state: :blocked}), do: :bad
+  defp state(%{state: held}) when held in [:blocked, :estop], do: :bad
   defp state(%{state: :unsure}), do: :unsure
   defp state(_robot), do: :plain
 end

@@ -139,7 +139,7 @@ defmodule Hal.Camera.FFmpegTest do
   defp recording(folder, {width, height}) do
     file = Path.join(folder, "#{width}.ts")
     source = "testsrc=size=#{width}x#{height}:rate=10:duration=2"
-    arguments = ~w(-v error -y -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts #{file})
+    arguments = ~w(-v error -y -f lavfi -i #{source} -c:v mpeg2video -bf 0 -f mpegts) ++ [file]
     {"", 0} = System.cmd("ffmpeg", arguments, stderr_to_stdout: true)
     File.read!(file)
   end

@@ -40,12 +40,12 @@ defmodule Mesh.Distribution.Dialer do
 
     # A previous dialer may already have been told about nodes.
     known = for node <- Map.keys(Mesh.view().nodes), into: %{}, do: {node, row(now)}
-    fleet = MapSet.new(Map.values(Roster.new(node(), options.fleet).nodes))
+    roster = Roster.new(node(), options.fleet)
 
     {:ok,
      %{
        options: options,
-       fleet: fleet,
+       roster: roster,
        known: known,
        dialling: %{},
        chance: chance,
@@ -56,9 +56,14 @@ defmodule Mesh.Distribution.Dialer do
 
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
-    if node in s.fleet,
-      do: {:noreply, dial(%{s | known: Map.put(s.known, node, row(Hal.Clock.now_ms()))})},
-      else: {:noreply, s}
+    case Roster.enter(s.roster, Atom.to_string(node)) do
+      {:ok, _node, roster} ->
+        known = Map.put(s.known, node, row(Hal.Clock.now_ms()))
+        {:noreply, dial(%{s | known: known, roster: roster})}
+
+      :error ->
+        {:noreply, s}
+    end
   end
 
   def handle_cast(_silent_or_unknown, s), do: {:noreply, s}

@@ -20,15 +20,14 @@ defmodule Mesh.Protocol.Admission do
   @spec admit(
           Mesh.Protocol.t(),
           Packet.t(),
-          node(),
           Packet.Filter.body(),
           Mesh.Protocol.address(),
           integer()
         ) :: {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
-  def admit(protocol, packet, node, body, address, now_ms) do
+  def admit(protocol, packet, body, address, now_ms) do
     if address in packet.addresses,
-      do: judge(protocol, packet, node, body, address, now_ms),
-      else: take_late(protocol, packet, node, body, {:foreign, packet.sender}, address, now_ms)
+      do: judge(protocol, packet, body, address, now_ms),
+      else: take_late(protocol, packet, body, {:foreign, packet.sender}, address, now_ms)
   end
 
   @doc "Time: forgets whom it challenged a while ago."
@@ -38,9 +37,12 @@ defmodule Mesh.Protocol.Admission do
     %{protocol | challenged: Map.filter(protocol.challenged, lately)}
   end
 
-  defp judge(protocol, packet, node, body, address, now_ms) do
+  defp judge(protocol, packet, body, address, now_ms) do
     case ReplayProtection.admit(protocol.replay, packet, echo(body), now_ms) do
       {:ok, replay} ->
+        # Only now its name becomes an atom: it has signed this, and just now.
+        {:ok, node, roster} = Roster.enter(protocol.roster, packet.sender)
+        protocol = %{protocol | roster: roster}
         new? = ReplayProtection.session(protocol.replay, packet.sender) != packet.session
 
         {node_table, changes} =
@@ -61,7 +63,7 @@ defmodule Mesh.Protocol.Admission do
 
       {:error, :stale, replay} ->
         {protocol, taken} =
-          take_late(%{protocol | replay: replay}, packet, node, body, :stale, address, now_ms)
+          take_late(%{protocol | replay: replay}, packet, body, :stale, address, now_ms)
 
         {protocol, sent} = challenge(protocol, packet, body, address, now_ms)
         {protocol, taken ++ sent}
@@ -75,9 +77,10 @@ defmodule Mesh.Protocol.Admission do
   defp echo(_other), do: nil
 
   # What is taken at any age, and from anywhere; all else is rejected for that reason.
-  defp take_late(protocol, packet, node, body, why, address, now_ms) do
+  defp take_late(protocol, packet, body, why, address, now_ms) do
     with {:service, service, _term} <- body,
          true <- service in protocol.late,
+         {:ok, node} <- Roster.node(protocol.roster, packet.sender),
          {:ok, replay} <- ReplayProtection.admit_late(protocol.replay, packet, now_ms) do
       take(%{protocol | replay: replay}, packet, node, body, address, now_ms)
     else

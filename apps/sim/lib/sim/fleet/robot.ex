@@ -5,6 +5,7 @@ defmodule Sim.Fleet.Robot do
   alias Sim.Fleet.Hardware
   alias Sim.World
   alias Robot.Mission.{Claim, Manual}
+  alias Swarm.EStop
 
   @armed_ms 5_000
   @look_ms 10
@@ -90,6 +91,7 @@ defmodule Sim.Fleet.Robot do
            Board.fetch(board, :mission, :infinity) do
       claim = timely(state, claim, Board.now(board) - (ticked_ms || at_ms))
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
+      claim = if Board.latched?(board), do: Map.put(claim, :estop, callers(board)), else: claim
 
       case state do
         {Manual, phase} when phase not in @over -> Map.put(claim, :phase, :manual)
@@ -103,6 +105,8 @@ defmodule Sim.Fleet.Robot do
 
   defp timely({mission, _phase}, claim, age_ms), do: Claim.timely(mission, claim, age_ms)
   defp timely(:idle, claim, _age_ms), do: claim
+
+  defp callers(board), do: board |> EStop.written() |> EStop.State.callers()
 
   defp uncertainty(board) do
     with {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),

@@ -51,6 +51,7 @@ defmodule Sim.Trial.Evaluation do
       formation: formation(run, leader),
       error: error(robots),
       formed?: RunLog.formed?(run.run_log),
+      estop: run.run_log.estop,
       stages: RunLog.stages(run.run_log)
     }
   end
@@ -176,5 +177,7 @@ defmodule Sim.Trial.Evaluation do
   end
 
   defp state(nil), do: :dead
+  # What keeps it from moving comes before what it would do.
+  defp state(%{estop: _callers}), do: :estop
   defp state(claim), do: Claim.state(claim)
 end

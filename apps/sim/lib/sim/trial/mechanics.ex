@@ -34,8 +34,10 @@ defmodule Sim.Trial.Mechanics do
   @spec claims(trial()) :: [{atom(), map()}]
   def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
 
-  defp claim(member),
-    do: Map.put_new(Member.claim(member), :uncertainty, Member.uncertainty(member))
+  defp claim(member) do
+    claim = Map.put_new(Member.claim(member), :uncertainty, Member.uncertainty(member))
+    if callers = Member.held(member), do: Map.put(claim, :estop, callers), else: claim
+  end
 
   @doc "The run at this moment, as `Sim.Trial.Evaluation` judges it."
   @spec run(trial()) :: Evaluation.run()

@@ -3,6 +3,7 @@ defmodule Sim.Trial.RunLog do
   # Records a run: its stages, its leaders, how long it was in formation. Pure; fed every 100 ms
   # with what the living robots claim.
 
+  alias Sim.Scene
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 
   defstruct roles: %{},
@@ -16,6 +17,7 @@ defmodule Sim.Trial.RunLog do
             formed_ticks: 0,
             formed_ms: nil,
             rest_ms: nil,
+            estop: nil,
             agreement: %Sim.Trial.AgreementMetrics{},
             claims: %Sim.Trial.Claims{},
             stuck: %Sim.Trial.Stuck{}
@@ -45,6 +47,7 @@ defmodule Sim.Trial.RunLog do
           formed_ticks: non_neg_integer(),
           formed_ms: integer() | nil,
           rest_ms: integer() | nil,
+          estop: Scene.estop() | nil,
           agreement: Sim.Trial.AgreementMetrics.t(),
           claims: Sim.Trial.Claims.t(),
           stuck: Sim.Trial.Stuck.t()
@@ -91,7 +94,7 @@ defmodule Sim.Trial.RunLog do
     elected? = run_log.elections > 0
 
     %{
-      run_log
+      held(run_log, at_ms, claims)
       | leader: highest(leaders),
         epoch:
           Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
@@ -106,6 +109,18 @@ defmodule Sim.Trial.RunLog do
             do: run_log.rest_ms || at_ms
           )
     }
+  end
+
+  defp held(run_log, at_ms, claims) do
+    held = for {id, %{estop: callers}} <- claims, do: {id, callers}
+    estop = Scene.estop(run_log.estop, held, length(claims), at_ms)
+    log = %{run_log | estop: estop}
+
+    case {run_log.estop, estop} do
+      {nil, %{by: by}} -> stage(log, at_ms, :estop_holds, nil, %{by: by})
+      {%{}, nil} -> stage(log, at_ms, :estop_over, nil, %{})
+      _the_same -> log
+    end
   end
 
   @doc """

@@ -83,7 +83,6 @@ defmodule Sim.Hardware.RecordingTest do
   end
 
   @tag long: true, realtime: :long
-  @tag timeout: 900_000
   test "so do ten missions, in which robots are stopped, commanded and killed", %{tmp_dir: folder} do
     deeds = [
       [],

@@ -9,14 +9,49 @@ defmodule Swarm.Commands.Client do
   alias Swarm.Order.Freshness
 
   @answer_ms 500
+  # In the dictionary of the process: the order may be given by any function of `Swarm`, also within code of others.
+  @given {__MODULE__, :given_us}
+
+  @doc "Calls a function whose orders count as given then (`Swarm.given/2`)."
+  @spec given(at_us :: integer(), (... -> result)) :: result when result: term()
+  def given(at_us, fun) do
+    before = Process.put(@given, min(at_us, given_us()))
+
+    try do
+      fun.()
+    after
+      if before, do: Process.put(@given, before), else: Process.delete(@given)
+    end
+  end
+
+  @doc "When an order that this process gives now counts as given: now, but for `given/2`."
+  @spec given_us() :: integer()
+  def given_us, do: Process.get(@given) || now_us()
+
+  @doc "Whether an order of this process would be on time; the error is one line."
+  @spec timely() :: :ok | {:error, line :: String.t()}
+  def timely do
+    waited_us = now_us() - given_us()
+    if waited_us < @answer_ms * 1_000, do: :ok, else: Freshness.late(div(waited_us, 1_000))
+  end
 
   @doc """
   The answers of the robots within half a second; a robot that does not answer is not in the map.
-  All are asked at once, so that a silent robot does not delay another's answer.
+  All are asked at once, so that a silent robot does not delay another's answer. An order that was given longer ago is not
+  sent.
   """
   @spec ask([atom()], term()) :: %{atom() => term()}
   def ask(robots, request) do
-    given_us = System.monotonic_time(:microsecond)
+    needed? = Freshness.needed?(request)
+
+    with true <- needed?, {:error, _line} = late <- timely() do
+      Map.new(robots, &{&1, late})
+    else
+      _on_time -> ask(robots, request, if(needed?, do: given_us(), else: now_us()))
+    end
+  end
+
+  defp ask(robots, request, given_us) do
     deadline = div(given_us, 1_000) + @answer_ms
 
     waiting =
@@ -98,7 +133,7 @@ defmodule Swarm.Commands.Client do
   end
 
   defp stamped(id, to, {request, given_us}, stamp) do
-    waited_us = System.monotonic_time(:microsecond) - given_us
+    waited_us = now_us() - given_us
 
     with {:ok, order} <- Freshness.given(stamp, waited_us),
          do: post(id, to, request, order),
@@ -146,6 +181,8 @@ defmodule Swarm.Commands.Client do
   end
 
   defp hand(pid, _id, order, _ref), do: with(:ok <- Nonblocking.cast(pid, order), do: {:ok, pid})
+
+  defp now_us, do: System.monotonic_time(:microsecond)
 
   defp with_ref({:stamp}, ref), do: {:stamp, ref}
   defp with_ref({:command, request}, ref), do: {:command, request, ref}

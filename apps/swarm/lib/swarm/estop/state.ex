@@ -25,6 +25,27 @@ defmodule Swarm.EStop.State do
 
   @type t :: %__MODULE__{held: [tag()], cleared: [tag()], calls: Calls.t()}
 
+  @doc """
+  The names of the nodes whose calls hold the robot, as far as their calls were heard here, without their hosts; in a
+  simulation they may be robots.
+
+      iex> stop = Swarm.EStop.State.press(Swarm.EStop.State.new(), {:base@hall, 1_700_000_000_000, 1})
+      iex> {Swarm.EStop.State.callers(stop), Swarm.EStop.State.callers(Swarm.EStop.State.reset(stop))}
+      {["base"], []}
+  """
+  @spec callers(t()) :: [String.t()]
+  def callers(%__MODULE__{held: []}), do: []
+
+  def callers(%__MODULE__{held: held, calls: calls}) do
+    names =
+      for {node, {boot, counter}} <- calls, tag({node, boot, counter}) in held do
+        [name | _host] = node |> Atom.to_string() |> String.split("@")
+        if name == "nonode", do: "this program", else: name
+      end
+
+    names |> Enum.uniq() |> Enum.sort()
+  end
+
   @doc "The state without a stop."
   @spec new() :: t()
   def new, do: %__MODULE__{}

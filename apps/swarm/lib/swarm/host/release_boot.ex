@@ -14,7 +14,7 @@ defmodule Swarm.Host.ReleaseBoot do
   """
   alias Robot.File.Summary
   alias Swarm.Host.{Machine, PowerOff}
-  alias Mesh.{Interface, Secret}
+  alias Mesh.{Environment, Interface, Secret}
   alias Mesh.Distribution.Epmd
   alias Swarm.MemberSpec
 
@@ -115,7 +115,7 @@ defmodule Swarm.Host.ReleaseBoot do
   @spec answer(command :: String.t(), environment(), patience_ms :: non_neg_integer()) ::
           {status :: 0 | 1, output :: [String.t()], errors :: [String.t()]}
   def answer(command, environment, patience_ms \\ @patience_ms) do
-    case {robot(environment), command} do
+    case {checked(environment), command} do
       {{:ok, robot}, "halt"} ->
         halt(environment, file(robot))
 
@@ -130,6 +130,15 @@ defmodule Swarm.Host.ReleaseBoot do
 
       {{:error, lines}, command} ->
         wrong(command, environment, lines)
+    end
+  end
+
+  # What is wrong in the environment, and what is wrong in the file.
+  defp checked(environment) do
+    case {Environment.check(environment), robot(environment)} do
+      {:ok, robot} -> robot
+      {{:error, lines}, {:error, more}} -> {:error, lines ++ more}
+      {error, {:ok, _robot}} -> error
     end
   end
 
@@ -181,15 +190,13 @@ defmodule Swarm.Host.ReleaseBoot do
   defp begins(environment, settings, file, patience_ms) do
     port = settings.dist_port
 
-    with {:ok, _interface} <- interface(settings) do
-      if free?(port, patience_ms),
-        do: shell(settings, file),
-        else:
-          {:error,
-           "#{environment["ROBOT"]} does not start: its TCP port #{port} is in use. Either it runs here already " <>
-             "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
-             "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
-    end
+    if free?(port, patience_ms),
+      do: shell(settings, file),
+      else:
+        {:error,
+         "#{environment["ROBOT"]} does not start: its TCP port #{port} is in use. Either it runs here already " <>
+           "(robot status tells how it is, robot stop ends it), or another program has the port (ss -ltnp), " <>
+           "and dist_port: of its file, or CONVOY_DIST_PORT, names another"}
   end
 
   # In the same way as Erlang's distribution will listen.
@@ -212,10 +219,8 @@ defmodule Swarm.Host.ReleaseBoot do
 
   defp shell(s, _file), do: [s.cookie, s.secret_file, to_string(s.dist_port), s.interface || ""]
 
-  defp about(environment, settings, file) do
-    with {:ok, interface} <- interface(settings),
-         do: words(environment, file) ++ Machine.lacks(interface)
-  end
+  defp about(environment, settings, file),
+    do: words(environment, file) ++ Machine.lacks(interface(settings))
 
   defp words(environment, nil), do: ["#{environment["ROBOT"]}: a node without a robot"]
 
@@ -224,13 +229,9 @@ defmodule Swarm.Host.ReleaseBoot do
     Summary.report(path, file)
   end
 
-  # That of the file was checked with it.
-  defp interface(%{interface: nil}), do: {:ok, {0, 0, 0, 0}}
-
-  defp interface(%{interface: text}) do
-    with :error <- Interface.read(text),
-         do: {:error, "CONVOY_INTERFACE: expected #{Interface.allowed()}, got #{inspect(text)}"}
-  end
+  # That of the file was checked with it, that of the environment before.
+  defp interface(%{interface: nil}), do: {0, 0, 0, 0}
+  defp interface(%{interface: text}), do: text |> Interface.read() |> elem(1)
 
   defp file({file, _config}), do: file
   defp file(nil), do: nil

@@ -132,9 +132,21 @@ defmodule Swarm.Order.Freshness do
     do: {:error, "#{robot} got this command too late to know how old it is; repeat it"}
 
   def refusal(robot, age_ms) do
-    seconds = :erlang.float_to_binary(age_ms / 1000, decimals: 1)
-
     {:error,
-     "#{robot} got this command too late, #{seconds} s old; at most 0.5 s are allowed; repeat it"}
+     "#{robot} got this command too late, #{seconds(age_ms)} s old; at most 0.5 s are allowed; repeat it"}
   end
+
+  @doc """
+  The answer to an order that is too old to be sent.
+
+      iex> Swarm.Order.Freshness.late(3_210)
+      {:error, "given 3.2 s ago and not carried out: at most 0.5 s are allowed; repeat it"}
+  """
+  @spec late(age_ms :: non_neg_integer()) :: {:error, String.t()}
+  def late(age_ms) do
+    {:error,
+     "given #{seconds(age_ms)} s ago and not carried out: at most 0.5 s are allowed; repeat it"}
+  end
+
+  defp seconds(age_ms), do: :erlang.float_to_binary(age_ms / 1000, decimals: 1)
 end

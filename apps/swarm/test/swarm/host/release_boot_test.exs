@@ -128,7 +128,7 @@ defmodule Swarm.Host.ReleaseBootTest do
     end
 
     # Who runs already, is reached.
-    assert {0, [_cookie | _], []} = ReleaseBoot.answer("rpc", with_interface.("300.1.2.3"))
+    assert {0, [_cookie | _], [_line]} = ReleaseBoot.answer("rpc", with_interface.("300.1.2.3"))
 
     for absent <- ["203.0.113.9", "no-card"] do
       assert {0, lines, []} = ReleaseBoot.answer("check", with_interface.(absent))
@@ -143,6 +143,43 @@ defmodule Swarm.Host.ReleaseBootTest do
     File.write!(environment["CONVOY_ROBOT_FILE"], file(~s(, network: [interface: "10.0.0.300"])))
     assert {1, [], [line]} = ReleaseBoot.answer("check", environment)
     assert line =~ ~s(mag1.exs:1: network.interface: expected an IPv4 address)
+  end
+
+  test "settings of the environment are checked as those of the file; none is dropped in silence",
+       %{
+         tmp_dir: folder
+       } do
+    for {name, wrong} <- [
+          {"CONVOY_PEERS", "mag1@10.0.0.7"},
+          {"CONVOY_PEERS", "mag1@convoy=10.0.0.7:99999"},
+          {"CONVOY_PEERS", "mag1@convoy=10.0.0.7;mag2@convoy=10.0.0.8"},
+          {"CONVOY_PEERS", "mag1@convoy=robot.lab"},
+          {"CONVOY_ALLOW", "10.0.0.0/33"},
+          {"CONVOY_ALLOW", "300.1.1.1"},
+          {"CONVOY_DIST_PORT", "99999"},
+          {"CONVOY_DIST_PORT", "0"},
+          {"CONVOY_DIST_PORT", "9101x"},
+          {"CONVOY_TLS", "yes"},
+          {"CONVOY_UDP_PORT", "-1"},
+          {"CONVOY_UDP_PEERS", "10.0.0.7:0"},
+          {"CONVOY_PEER", "mag1@convoy=10.0.0.7"}
+        ],
+        command <- ~w(check start) do
+      assert {1, [], [line]} =
+               ReleaseBoot.answer(command, machine(folder, file(), %{name => wrong}), 0)
+
+      assert line =~ ~r/\A#{name}(: expected .*, got| is not known; did you mean CONVOY_PEERS\?)/
+    end
+
+    right = %{
+      "CONVOY_PEERS" => "mag2@convoy=10.0.0.12:9400, min1@convoy=[fe80::1]",
+      "CONVOY_ALLOW" => "10.0.0.20,10.0.1.0/24",
+      "CONVOY_DIST_PORT" => "9499",
+      "CONVOY_TLS" => "1",
+      "CONVOY_UDP_PEERS" => "10.0.0.7:4370"
+    }
+
+    assert {0, _lines, []} = ReleaseBoot.answer("check", machine(folder, file(), right))
   end
 
   test "the robots of the release use the secret of the environment", %{tmp_dir: folder} do

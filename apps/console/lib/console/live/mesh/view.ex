@@ -13,7 +13,13 @@ defmodule Console.Live.Mesh.View do
   # Older lines are forgotten.
   @most_stages 200
 
-  defstruct statuses: %{}, order: [], gone: MapSet.new(), places: %{}, stages: [], told: 0
+  defstruct statuses: %{},
+            order: [],
+            gone: MapSet.new(),
+            places: %{},
+            stages: [],
+            told: 0,
+            estop: nil
 
   @type t :: %__MODULE__{
           statuses: %{atom() => Status.t()},
@@ -21,7 +27,8 @@ defmodule Console.Live.Mesh.View do
           gone: MapSet.t(atom()),
           places: %{atom() => Frames.place()},
           stages: [map()],
-          told: non_neg_integer()
+          told: non_neg_integer(),
+          estop: Scene.estop() | nil
         }
 
   @doc "Nobody was heard yet."
@@ -51,7 +58,14 @@ defmodule Console.Live.Mesh.View do
     order = view.order ++ (kept |> Map.keys() |> Enum.sort() |> Kernel.--(view.order))
 
     places = Frames.places(for id <- order, do: heard(kept[id], id in gone))
-    view = %{view | statuses: kept, order: order, gone: gone, places: places}
+    # What one was that does not answer is not what it is.
+    held =
+      for {id, %{estop: true} = status} <- Enum.sort(kept),
+          id not in gone and status.state != :no_answer,
+          do: {id, status.estop_by}
+
+    estop = Scene.estop(view.estop, held, map_size(kept) - MapSet.size(gone), at_ms)
+    view = %{view | statuses: kept, order: order, gone: gone, places: places, estop: estop}
     Enum.reduce(lines, view, &tell(&1, &2, clock, at_ms))
   end
 
@@ -133,6 +147,7 @@ defmodule Console.Live.Mesh.View do
       leader: leader && leader.id,
       epoch: leader && view.statuses[leader.id].epoch,
       formation: nil,
+      estop: view.estop,
       stages: view.stages
     }
   end
@@ -155,7 +170,7 @@ defmodule Console.Live.Mesh.View do
   end
 
   # What keeps it from moving comes before what it would do.
-  defp shown(%{estop: true}), do: "E-STOP"
+  defp shown(%{estop: true}), do: :estop
   defp shown(%{arming: :disarmed}), do: "disarmed"
   defp shown(%{arming: {:error, _reason}}), do: "line lost"
   defp shown(%{state: :no_answer}), do: "no answer"

@@ -24,19 +24,18 @@ defmodule Mesh.Protocol.Packet.Filter do
           | {:unknown_node, String.t()}
 
   @doc """
-  Reads a datagram from this address: the packet, the node that made it and its content. `:own` is
-  this node's own datagram, heard by multicast.
+  Reads a datagram from this address: the packet and its content. `:own` is this node's own datagram, heard by multicast.
   """
   @spec read(Mesh.Protocol.t(), binary(), Mesh.Strategy.address()) ::
-          {:ok, Packet.t(), node(), body()} | {:error, refusal()}
+          {:ok, Packet.t(), body()} | {:error, refusal()}
   def read(protocol, datagram, address) do
     with :ok <- original(Packet.peek(datagram), protocol.replay),
          :ok <- patience(protocol, address),
          {:ok, packet} <- Packet.open(datagram, protocol.secret.key),
          :ok <- foreign(packet, protocol),
-         {:ok, node} <- known(packet.sender, protocol.roster),
+         :ok <- welcome(packet.sender, protocol.roster),
          {:ok, body} <- content(packet, protocol) do
-      {:ok, packet, node, body}
+      {:ok, packet, body}
     end
   end
 
@@ -53,11 +52,10 @@ defmodule Mesh.Protocol.Packet.Filter do
 
   defp foreign(_packet, _station), do: :ok
 
-  defp known(name, roster) do
-    case Roster.node(roster, name) do
-      {:ok, node} -> {:ok, node}
-      :error -> {:error, {:unknown_node, name}}
-    end
+  defp welcome(name, roster) do
+    if is_map_key(roster.nodes, name) or Roster.guest?(roster, name),
+      do: :ok,
+      else: {:error, {:unknown_node, name}}
   end
 
   # Half of all datagrams are copies, one by multicast and one by address: these cost no signature
