@@ -96,7 +96,7 @@ defmodule ConsoleCommandTest do
     for {arguments, line} <- [
           {~w(--connect mag1), ~s(--connect: expected a node such as mag1@convoy, got "mag1")},
           {~w(--page 70000), ~s(--page: expected a port from 0 to 65535, got "70000")},
-          {~w(--page-address 0.0.0.0), "--page-address of other machines needs --page-token"}
+          {~w(--page-address 0.0.0.0), "--page-address of other machines needs --page-token-file"}
         ] do
       environment = [{"CONVOY_DIST_PORT", "#{tcp_port()}"} | context.environment]
       options = [cd: @root, env: environment, stderr_to_stdout: true]

@@ -23,7 +23,7 @@ defmodule Console.MixProject do
     do: [extra_applications: [:logger, :crypto] ++ for_tests(Mix.env()) ++ [mochiweb: :optional]]
 
   # Mix hides applications of OTP that are not listed. mochiweb serves the page, where it is. The tests read the
-  # pictures' XML.
-  defp for_tests(:test), do: [:xmerl, :inets]
+  # pictures' XML, and have a proxy with HTTPS.
+  defp for_tests(:test), do: [:xmerl, :inets, :ssl]
   defp for_tests(_env), do: []
 end

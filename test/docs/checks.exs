@@ -35,6 +35,7 @@ defmodule Docs.Checks do
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
     "bin/demo --map building.yaml" => @live,
     "bin/demo --headless --map hospital.png:110x42 --robots 5" => @drawing,
+    "bin/console --page-address 0.0.0.0 --page-token-file page.token" => @live,
     "bin/demo --hardware 1" => @live,
     "mix demo --record live.mcap" => @live,
     "mix demo --headless --hardware 2 --record live.mcap" => @long,

@@ -29,6 +29,7 @@ defmodule Console.Options do
             page: 0,
             page_address: {127, 0, 0, 1},
             page_token: nil,
+            page_origin: nil,
             plan: nil,
             headless: false,
             speed: nil,
@@ -196,7 +197,7 @@ the prompt then takes pause, step, speed"},
       {"page", "PORT|off", &page/1,
        "live, also in a browser: the port of the page, or none\n(any that is free)"}
     ] ++
-      Page.table() ++
+      Page.table(folder) ++
       [
         {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
          "paint camera pictures, or skip the painting (painted)"}
@@ -208,6 +209,7 @@ the prompt then takes pause, step, speed"},
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
   defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
+  defp put({"page-token-file", token}, options), do: %{options | page_token: token}
 
   # The other names in the table are those of the struct.
   defp put({name, value}, options) do
@@ -313,7 +315,8 @@ the prompt then takes pause, step, speed"},
   defp check_speed(other), do: other
 
   defp check_page({:ok, options}) do
-    with {:error, line} <- Page.check(options.page_address, options.page_token),
+    with {:error, line} <-
+           Page.check(options.page_address, options.page_token, options.page_origin),
          do: {:error, [line]},
          else: (:ok -> {:ok, options})
   end

@@ -9,7 +9,7 @@ defmodule Console.Page do
 
       Console.Page (one_for_one)
       |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
-      `-- mochiweb             a process for each connection
+      `-- Console.Page.Door    a process for each connection, in which mochiweb runs; ends those that say nothing
           `-- of a WebSocket: Console.Orders carries out what is typed and clicked, Console.Page.Client tells of the robot
               that is looked at, a pusher writes the newest scene, as fast as the browser takes it; all end together, and
               the page connects again
@@ -17,18 +17,13 @@ defmodule Console.Page do
   Who may look and command is decided by `Console.Page.Access`.
   """
   use Supervisor
-  # Debian's package; without it there is no page.
-  @compile {:no_warn_undefined, [:mochiweb_http, :mochiweb_socket_server]}
   alias Console.Page
-  alias Console.Page.{Feed, Request}
-
-  # Connections at once; one browser takes a few while it loads.
-  @most 200
+  alias Console.Page.{Door, Feed}
 
   @typedoc """
   `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
   which these are now; `address` (loopback) and `port` (any that is
-  free) to listen on; `token` is demanded where the address is not the loopback's.
+  free) to listen on; `token` is demanded where the address is not the loopback's; `origin` is that of a proxy before the page.
   """
   @type option ::
           {:module, module()}
@@ -37,6 +32,7 @@ defmodule Console.Page do
           | {:address, :inet.ip_address()}
           | {:port, :inet.port_number()}
           | {:token, String.t() | nil}
+          | {:origin, String.t() | nil}
 
   @doc """
   Starts it, and says where it is, such as `http://127.0.0.1:40123/`; the error says in one line why there is no page,
@@ -44,13 +40,13 @@ defmodule Console.Page do
   """
   @spec start_link([option()]) :: {:ok, pid(), url :: String.t()} | {:error, line :: String.t()}
   def start_link(options) do
-    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil] ++ options)
+    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil, origin: nil] ++ options)
 
     with :ok <- server(),
          :ok <- guarded(options),
-         :ok <- free(options),
-         {:ok, page} <- Supervisor.start_link(__MODULE__, options) do
-      {:ok, page, url(options.address, :mochiweb_socket_server.get(child(page, :server), :port))}
+         {:ok, port} <- free(options),
+         {:ok, page} <- Supervisor.start_link(__MODULE__, %{options | port: port}) do
+      {:ok, page, url(options.address, port)}
     end
   end
 
@@ -65,17 +61,28 @@ defmodule Console.Page do
     end
   end
 
-  defp guarded(%{address: address, token: token}) do
-    if token != nil or Page.Access.loopback?(address),
-      do: :ok,
-      else: {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
+  defp guarded(%{address: address, token: nil, origin: origin}) do
+    cond do
+      not Page.Access.loopback?(address) ->
+        {:error, "on #{:inet.ntoa(address)} others can reach the page: it needs a token"}
+
+      origin != nil ->
+        {:error, "by #{origin} others can reach the page: it needs a token"}
+
+      true ->
+        :ok
+    end
   end
 
-  # The server says of a port that is taken only that it fell.
+  defp guarded(_with_a_token), do: :ok
+
+  # Any that is free is chosen once: a door that was restarted must be where the open pages look for it.
   defp free(%{address: address, port: port}) do
     case :gen_tcp.listen(port, ip: address, reuseaddr: true) do
       {:ok, socket} ->
+        port = :inet.port(socket)
         :gen_tcp.close(socket)
+        port
 
       {:error, reason} ->
         {:error, "no page on #{:inet.ntoa(address)}:#{port}: #{:inet.format_error(reason)}"}
@@ -86,30 +93,15 @@ defmodule Console.Page do
   def init(options) do
     robots = options.robots
     robots = if is_list(robots), do: fn -> robots end, else: robots
-    request = {Request, :answer, [%{robots: robots, token: options.token, page: self()}]}
+    session = Base.url_encode64(:crypto.strong_rand_bytes(24), padding: false)
 
-    server = %{
-      id: :server,
-      start:
-        {:mochiweb_http, :start_link,
-         [
-           [
-             ip: options.address,
-             port: options.port,
-             name: :undefined,
-             max: @most,
-             nodelay: true,
-             loop: request
-           ]
-         ]}
-    }
+    page =
+      options
+      |> Map.take([:token, :origin, :port])
+      |> Map.merge(%{robots: robots, page: self(), session: session})
 
+    door = {Door, options |> Map.take([:address, :port]) |> Map.put(:page, page)}
     feed = {Feed, Map.take(options, [:module, :live])}
-    Supervisor.init([feed, server], strategy: :one_for_one)
-  end
-
-  defp child(page, id) do
-    {^id, pid, _type, _modules} = List.keyfind(Supervisor.which_children(page), id, 0)
-    pid
+    Supervisor.init([feed, door], strategy: :one_for_one)
   end
 end

@@ -1,4 +1,5 @@
 // The map: what is drawn of a scene, and what a pointer does to it. Metres, x right, y up.
+import { modified } from "./keys.js";
 
 // Okabe and Ito's colours, which the colour-blind tell apart.
 const COLOURS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#999933", "#882255"];
@@ -25,7 +26,9 @@ export class FloorView {
     canvas.addEventListener("pointerdown", (e) => this.down(e));
     canvas.addEventListener("pointermove", (e) => this.move(e));
     canvas.addEventListener("pointerup", (e) => this.up(e));
-    canvas.addEventListener("pointercancel", () => (this.dragged = null));
+    // A drag whose end is not told gives no order.
+    for (const name of ["pointercancel", "lostpointercapture"]) canvas.addEventListener(name, () => this.abandon());
+    addEventListener("blur", () => this.abandon());
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
     for (const name of ["focus", "blur"]) canvas.addEventListener(name, () => this.draw());
@@ -351,22 +354,30 @@ export class FloorView {
     return { robot };
   }
 
+  // Only one pointer, and its main button, gives orders: a right click opens a menu, two fingers are no click.
   down(e) {
-    if (!this.fit()) return;
+    if (this.dragged && this.dragged.id !== e.pointerId) return this.abandon();
+    if (!this.fit() || e.button !== 0 || !e.isPrimary) return;
     const { landmark, robot } = this.at(e);
     this.canvas.setPointerCapture(e.pointerId);
-    this.dragged = { from: [e.clientX, e.clientY], view: { ...this.view }, robot, moved: false };
+    this.dragged = { id: e.pointerId, from: [e.clientX, e.clientY], view: { ...this.view }, robot, moved: false };
     if (landmark) this.dragged.landmark = this.toFloor(e);
   }
 
   move(e) {
     const d = this.dragged;
     if (!d) return;
+    if (e.buttons === 0) return this.abandon();
     const [dx, dy] = [e.clientX - d.from[0], e.clientY - d.from[1]];
     if (Math.hypot(dx, dy) > 4) d.moved = true;
     if (d.landmark) d.landmark = this.toFloor(e);
     else if (d.moved && !this.follow && (this.mine = true))
       Object.assign(this.view, { x: d.view.x - dx / d.view.scale, y: d.view.y + dy / d.view.scale });
+    this.draw();
+  }
+
+  abandon() {
+    this.dragged = null;
     this.draw();
   }
 
@@ -385,16 +396,17 @@ export class FloorView {
     this.zoom(e.deltaY < 0 ? 1.15 : 0.87);
   }
 
+  // With a modifier a key is the browser's; one that is held gives one order.
   key(e) {
-    if (!this.fit()) return;
+    if (!this.fit() || modified(e)) return;
     const step = 40 / this.view.scale;
     const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[e.key];
     if (way && !this.driving) {
       this.mine = true;
       this.view.x += way[0] * step;
       this.view.y += way[1] * step;
-    } else if (e.key === "Enter") this.on.send(this.view.x, this.view.y);
-    else if (e.key === "l" && this.map.offers.includes("landmark")) this.on.landmark(this.view.x, this.view.y);
+    } else if (e.key === "Enter") !e.repeat && this.on.send(this.view.x, this.view.y);
+    else if (e.key === "l" && this.map.offers.includes("landmark")) !e.repeat && this.on.landmark(this.view.x, this.view.y);
     else if (e.key === "+") this.zoom(1.3);
     else if (e.key === "-") this.zoom(0.77);
     else if (e.key === "0") this.zoom(0);

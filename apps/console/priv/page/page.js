@@ -1,12 +1,14 @@
 // The page: a WebSocket to the fleet, the map, and the panels beside it. Text from the fleet is only ever set as text.
 import { FloorView, colour } from "./map.js";
+import { HeldKeys, modified } from "./keys.js";
 
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
 const OLD_MS = 2000; // a scene comes ten times a second
 // A stop is sent at any time; all else only while the fleet is heard.
 const STOP = /^\s*(e+[\s-]?stop|stop|halt|emergenc|disarm)/i;
-let heard = 0, ahead = -Infinity, socket, chosen, scene, told = 0, tries = 0, keys = new Set(), driving = false, timer;
+let heard = 0, ahead = -Infinity, socket, chosen, scene, told = 0, tries = 0, driving = false, timer, opened = false, focused = null;
+const held = new HeldKeys();
 
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
@@ -15,16 +17,23 @@ const floor = window.floor = new FloorView(by("map"), {
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
 });
 
+// Beside this page, wherever a proxy puts it; with its token, if its address has one.
+const live = new URL(`live${location.search}`, location.href);
+live.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+
 function connect() {
-  socket = new WebSocket(`ws://${location.host}/live`);
+  socket = new WebSocket(live);
   socket.onopen = () => {
     tries = 0;
+    opened = true;
     ahead = -Infinity;
+    controls(true);
     if (chosen) say(`look ${chosen}`);
   };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
   socket.onclose = () => {
     lost();
+    if (!opened) by("fleet").textContent = `No connection to the fleet. If this page is behind a proxy, start the program with --page-origin ${location.origin}`;
     setTimeout(connect, Math.min(5000, 250 * 2 ** tries++));
   };
 }
@@ -34,6 +43,22 @@ function lost() {
   fleet.textContent = "No connection to the fleet. What you see is old, and the buttons reach nobody.";
   fleet.className = "lost";
   drive(false);
+  controls(false);
+}
+
+// What cannot work looks so. While nothing comes, but the connection stands, orders look so, too, and say why when they are
+// clicked; a stop is tried at any time.
+function controls(on) {
+  const open = socket.readyState === WebSocket.OPEN;
+  document.body.classList.toggle("silent", open && !on);
+  if (!open) focused ??= document.activeElement;
+  for (const set of document.querySelectorAll("fieldset")) set.disabled = !open;
+  const label = by("estop");
+  if (open !== (label.childElementCount === 0))
+    label.replaceChildren(open ? label.textContent : Object.assign(document.createElement("s"), { textContent: label.textContent }));
+  if (!open) return;
+  if (focused && document.activeElement === document.body) focused.focus();
+  focused = null;
 }
 
 const silent = () => performance.now() - heard > OLD_MS || ahead === -Infinity;
@@ -68,6 +93,7 @@ function hear(message) {
     floor.setMap(message);
   } else if (message.t === "scene") {
     tick(message.now);
+    controls(true);
     show(message);
   } else if (message.t === "about") about(message);
   else if (message.t === "answer") answer(message);
@@ -211,9 +237,11 @@ function about(told) {
   floor.draw();
 }
 
-// At most five pictures a second, and only while somebody looks; each is asked for when the one before is there.
+// At most five pictures a second, and only while somebody looks; each is asked for when the one before is there. One that does
+// not come ends it: what is shown would be old.
 const LOOK_MS = 200;
-let looking = false;
+const PICTURE_MS = 3000;
+let looking = false, looks = 0;
 
 function camera(on) {
   if (looking === on) return;
@@ -224,14 +252,18 @@ function camera(on) {
 }
 
 async function picture(id) {
-  while (looking && id === chosen) {
+  const look = ++looks;
+  const on = () => looking && look === looks;
+  while (on()) {
     const begun = performance.now();
     try {
-      const answer = await fetch(`/camera/${id}`);
+      const answer = await fetch(`camera/${id}`, { signal: AbortSignal.timeout(PICTURE_MS) });
       if (!answer.ok) throw new Error(await answer.text());
-      paint(await createImageBitmap(await answer.blob()));
+      const bitmap = await createImageBitmap(await answer.blob());
+      if (on()) paint(bitmap);
     } catch (error) {
-      hear({ t: "answer", ok: false, text: String(error.message) });
+      if (!on()) return;
+      hear({ t: "answer", ok: false, text: error.name === "TimeoutError" ? `no picture of ${id} for ${PICTURE_MS / 1000} s` : String(error.message) });
       return camera(false);
     }
     await new Promise((go) => setTimeout(go, Math.max(0, LOOK_MS - (performance.now() - begun))));
@@ -265,23 +297,23 @@ function stages() {
   told = scene.told;
 }
 
-// Driving: a word every 100 ms while the mode is on.
-const WAYS = { w: [1, 0], s: [-1, 0], a: [0, 1], d: [0, -1],
-  ArrowUp: [1, 0], ArrowDown: [-1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
-
+// Driving: a word every 100 ms while the mode is on and keys are held.
 function drive(on) {
   if (on === driving) return;
   driving = floor.driving = on;
   by("drive").setAttribute("aria-pressed", on);
-  keys.clear();
+  held.end();
   clearInterval(timer);
   if (on) timer = setInterval(word, DRIVE_MS);
 }
 
 function word() {
-  const sum = [...keys].map((k) => WAYS[k]).reduce(([a, b], [c, d]) => [a + c, b + d], [0, 0]);
-  const [ahead, turn] = sum.map((n) => Math.max(-1, Math.min(1, n)));
-  if (keys.size > 0) say(`drive ${chosen} ${ahead} ${turn}`);
+  const way = held.way(performance.now());
+  if (way) say(`drive ${chosen} ${way[0]} ${way[1]}`);
+  else if (held.silent) {
+    held.silent = false;
+    answer({ ok: false, text: `${chosen} stands: nothing was heard of the keys; let go of them, and press them again` });
+  }
 }
 
 // The stop goes first; who drove does not drive on, and says nothing after it.
@@ -291,22 +323,26 @@ function estop() {
 }
 
 addEventListener("keydown", (e) => {
-  const key = e.key.length === 1 ? e.key.toLowerCase() : e.key;
   if (e.key === "F8") {
     estop();
     e.preventDefault();
   }
   if (e.key === "Escape") drive(false);
-  if (!driving || !WAYS[key] || /INPUT|SELECT/.test(e.target.tagName)) return;
-  keys.add(key);
-  e.preventDefault();
+  const typed = /INPUT|SELECT/.test(e.target.tagName);
+  if (driving && (modified(e) || !typed) && held.down(e)) e.preventDefault();
 });
-addEventListener("keyup", (e) => keys.delete(e.key.length === 1 ? e.key.toLowerCase() : e.key));
-addEventListener("blur", () => keys.clear());
+addEventListener("keyup", (e) => held.up(e));
+// What may take the release of a key away.
+for (const name of ["blur", "focusin", "contextmenu", "visibilitychange"]) addEventListener(name, () => held.end());
+
+function ask(question) {
+  held.end();
+  return confirm(question);
+}
 
 by("estop").onclick = estop;
 by("reset").onclick = () =>
-  confirm("Reset the emergency stop? Robots may move again when they are started.") && say("reset");
+  ask("Reset the emergency stop? Robots may move again when they are started.") && say("reset");
 by("form").onclick = () => say(`formation ${by("shape").value} ${by("spacing").value}`);
 by("speed").onchange = () => say(`speed ${by("speed").value}`);
 by("drive").onclick = () => drive(!driving);
@@ -321,7 +357,7 @@ by("trails").onchange = (e) => ((floor.trails = e.target.checked), floor.draw())
 by("start").onclick = () => say(`start ${by("mission").value}`.trim());
 for (const b of document.querySelectorAll("[data-line]")) b.onclick = () => say(b.dataset.line);
 for (const b of document.querySelectorAll("[data-one]")) 
-  b.onclick = () => (!b.dataset.ask || confirm(`${b.dataset.ask} ${chosen}?`)) && say(`${b.dataset.one} ${chosen}`);
+  b.onclick = () => (!b.dataset.ask || ask(`${b.dataset.ask} ${chosen}?`)) && say(`${b.dataset.one} ${chosen}`);
 for (const b of document.querySelectorAll("[data-zoom]")) b.onclick = () => floor.zoom(Number(b.dataset.zoom));
 by("command").onsubmit = (e) => {
   e.preventDefault();
@@ -330,4 +366,5 @@ by("command").onsubmit = (e) => {
   line.value = "";
 };
 
+by("fleet").textContent = "connecting …";
 connect();

@@ -127,6 +127,72 @@ defmodule Console.OptionsTest do
     assert error("--robots 3 --fleet mag:3") =~ "exclude each other"
   end
 
+  @tag :tmp_dir
+  test "a proxy is named as browsers name it, and the page behind it has a token", %{
+    tmp_dir: folder
+  } do
+    file = token(folder, "a-secret-token\n")
+
+    for {text, origin} <- [
+          {"https://robots.lab.example", "https://robots.lab.example"},
+          {"https://Robots.lab.example:443/", "https://robots.lab.example"},
+          {"http://10.0.0.7:8080", "http://10.0.0.7:8080"}
+        ] do
+      assert {:ok, %{page_origin: ^origin}} =
+               Options.parse(["--page-token-file", file, "--page-origin", text])
+    end
+
+    for wrong <-
+          ~w(robots.lab.example ftp://a.example https:// https://a.example/fleet https://u@a.example https://a.example?b) do
+      assert Options.parse(["--page-token-file", file, "--page-origin", wrong]) ==
+               {:error,
+                [
+                  "--page-origin: expected an address without a path, such as https://robots.lab.example, got #{inspect(wrong)}"
+                ]}
+    end
+
+    assert error("--page-origin https://robots.lab.example") =~
+             "--page-origin needs --page-token-file"
+  end
+
+  defp token(folder, text, mode \\ 0o600) do
+    file = Path.join(folder, "page.token")
+    File.write!(file, text)
+    File.chmod!(file, mode)
+    file
+  end
+
+  @tag :tmp_dir
+  test "the page's token is in a file that nobody else reads, and is said by no error", %{
+    tmp_dir: folder
+  } do
+    token(folder, "a-secret-token\n")
+    parse = &Options.parse(["--page-address", "0.0.0.0", "--page-token-file", &1], folder)
+    assert {:ok, %{page_token: "a-secret-token"}} = parse.("page.token")
+
+    for {text, mode, why} <- [
+          {"a-secret-token", 0o640, "may be read by others (mode 0640, must be 0600)"},
+          {"short", 0o600, "has something else"},
+          {"a secret token", 0o600, "has something else"},
+          {<<0xFF, "-secret-token">>, 0o600, "has something else"},
+          {"", 0o600, "has something else"}
+        ] do
+      token(folder, text, mode)
+
+      assert parse.("page.token") ==
+               {:error,
+                [
+                  "--page-token-file: expected a file of mode 0600 with 8 to 100 letters, digits, - and _, got \"page.token\"; it #{why}"
+                ]}
+    end
+
+    assert {:error, [line]} = parse.("none.token")
+    assert line =~ "it does not exist"
+
+    assert {:error, [line]} = Options.parse(~w(--page-token a-secret-token))
+    assert line == "unknown option --page-token; did you mean --page-token-file?"
+  end
+
   test "a robot that does not exist is refused" do
     assert error("--kill mag9@3") =~ ~s("mag9"; allowed are leader, mag1 to mag3, min1 to min3)
   end

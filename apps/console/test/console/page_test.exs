@@ -1,6 +1,7 @@
 defmodule Console.PageTest do
   @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
   use ExUnit.Case, async: true
+  import Console.Wire, only: [ask: 2, ask: 3]
   alias Console.{Browser, Live, Options, Page}
   alias Console.Page.{Changes, Client, State}
   @moduletag :realtime
@@ -33,28 +34,6 @@ defmodule Console.PageTest do
       Page.start_link([module: module, live: live, robots: options.robots] ++ more)
 
     {page, url}
-  end
-
-  # The status and the text of an answer to a request with these lines.
-  defp ask(url, request, headers \\ []) do
-    %URI{port: port} = URI.parse(url)
-    {:ok, socket} = :gen_tcp.connect({127, 0, 0, 1}, port, [:binary, active: false])
-
-    headers =
-      Map.merge(%{"Host" => "127.0.0.1:#{port}", "Connection" => "close"}, Map.new(headers))
-
-    lines = for {name, value} <- headers, value != nil, do: "#{name}: #{value}\r\n"
-    :ok = :gen_tcp.send(socket, [request, " HTTP/1.1\r\n", lines, "\r\n"])
-    [head, body] = socket |> all("") |> String.split("\r\n\r\n", parts: 2)
-    [_all, status] = Regex.run(~r/^HTTP\/1.1 (\d+)/, head)
-    {String.to_integer(status), head, body}
-  end
-
-  defp all(socket, said) do
-    case :gen_tcp.recv(socket, 0, 10_000) do
-      {:ok, more} -> all(socket, said <> more)
-      {:error, :closed} -> said
-    end
   end
 
   describe "requests" do
@@ -99,9 +78,16 @@ defmodule Console.PageTest do
       assert {401, _, "a token is needed" <> _} = ask(url, "GET /")
       assert {401, _, _} = ask(url, "GET /?token=another-token")
       assert {200, head, _} = ask(url, "GET /?token=a-secret-token")
-      assert head =~ "Set-Cookie: token=a-secret-token; HttpOnly; SameSite=Strict"
-      assert {426, _, _} = ask(url, "GET /live", [{"Cookie", "token=a-secret-token"}])
-      assert {401, _, _} = ask(url, "GET /live", [{"Cookie", "token=other"}])
+
+      assert [_all, name, secret] =
+               Regex.run(~r/Set-Cookie: (\w+)=(\S+); HttpOnly; SameSite=Strict; Path=/, head)
+
+      # It is no token, so nothing that is kept in a browser opens another page.
+      refute head =~ "a-secret-token"
+      assert {426, _, _} = ask(url, "GET /live", [{"Cookie", "#{name}=#{secret}"}])
+      assert {401, _, _} = ask(url, "GET /live", [{"Cookie", "#{name}=other"}])
+      assert {401, _, _} = ask(url, "GET /live", [{"Cookie", "#{name}=a-secret-token"}])
+      assert {401, _, _} = ask(url, "GET /?token=#{secret}")
     end
 
     test "a port that is taken is said in a line; so is an address without a token", %{
@@ -116,7 +102,7 @@ defmodule Console.PageTest do
       assert {:error, line} = Page.start_link(source ++ [address: {0, 0, 0, 0}])
       assert line =~ "it needs a token"
       assert {:error, [line]} = Options.parse(~w(--page-address 0.0.0.0))
-      assert line =~ "--page-token"
+      assert line =~ "--page-token-file"
     end
   end
 
@@ -131,6 +117,10 @@ defmodule Console.PageTest do
 
     defp fleet(browser),
       do: Browser.run(browser, "return document.getElementById('fleet').textContent")
+
+    # What a keyboard says again and again of a W that is held.
+    defp repeat(browser),
+      do: Browser.keyboard(browser, :down, code: "KeyW", key: "w", autoRepeat: true)
 
     # Where a place of the map is in the window.
     defp pixel(browser, {x, y}) do
@@ -311,7 +301,7 @@ defmodule Console.PageTest do
       to.("#drive")
       Browser.press(browser, [:enter])
       Browser.key(browser, :keyDown, "w")
-      wait(fn -> Swarm.status(:min1).by == :move end)
+      wait(fn -> repeat(browser) && Swarm.status(:min1).by == :move end)
 
       # Wherever the focus is, also where text is typed.
       to.("#line")
@@ -400,7 +390,7 @@ defmodule Console.PageTest do
             fn -> Browser.close(browser) end
           ] do
         Browser.key(browser, :keyDown, "w")
-        wait(fn -> Swarm.status(id).speed > 0.1 end)
+        wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
         ending.()
         wait(fn -> Swarm.status(id).speed == 0.0 end)
       end
@@ -489,7 +479,7 @@ defmodule Console.PageTest do
 
       [%{id: id}] = Live.Fleet.scene(live).robots
       Browser.key(browser, :keyDown, "w")
-      wait(fn -> Swarm.status(id).speed > 0.1 end)
+      wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
       [client] = clients(live)
       Process.exit(client, :kill)
       killed_ms = System.monotonic_time(:millisecond)

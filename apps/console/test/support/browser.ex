@@ -106,6 +106,45 @@ defmodule Console.Browser do
         actions: [%{type: "key", id: "keys", actions: [%{type: kind, value: key}]}]
       })
 
+  @doc """
+  A key event as a keyboard makes it, by the words of Chrome's DevTools (`Input.dispatchKeyEvent`): which key (`code`),
+  what it writes (`key`), whether it repeats (`autoRepeat`), and `modifiers` (1 Alt, 2 Ctrl, 4 Meta, 8 Shift).
+  """
+  @spec keyboard(%__MODULE__{}, :down | :up, keyword()) :: term()
+  def keyboard(browser, kind, event) do
+    type = if kind == :down, do: "rawKeyDown", else: "keyUp"
+    tools(browser, "Input.dispatchKeyEvent", event |> Map.new() |> Map.put(:type, type))
+  end
+
+  @doc "A pointer event, by the words of Chrome's DevTools (`Input.dispatchMouseEvent`)."
+  @spec mouse(%__MODULE__{}, String.t(), keyword()) :: term()
+  def mouse(browser, type, event),
+    do: tools(browser, "Input.dispatchMouseEvent", event |> Map.new() |> Map.put(:type, type))
+
+  @doc "Lets nothing load whose address is like one of these (`*/page.js`)."
+  @spec block(%__MODULE__{}, [String.t()]) :: term()
+  def block(browser, addresses) do
+    tools(browser, "Network.enable", %{})
+    tools(browser, "Network.setBlockedURLs", %{urls: addresses})
+  end
+
+  defp tools(browser, method, params),
+    do: command(browser, :post, "/goog/cdp/execute", %{cmd: method, params: params})
+
+  @doc "Answers the dialog that the page shows."
+  @spec dialog(%__MODULE__{}, :accept | :dismiss) :: term()
+  def dialog(browser, answer), do: command(browser, :post, "/alert/#{answer}", %{})
+
+  @doc "Opens another tab in front of the page, and closes it again. Commands go to the page all the time."
+  @spec elsewhere(%__MODULE__{}) :: term()
+  def elsewhere(browser) do
+    page = command(browser, :get, "/window", nil)
+    %{"handle" => other} = command(browser, :post, "/window/new", %{type: "tab"})
+    command(browser, :post, "/window", %{handle: other})
+    command(browser, :delete, "/window", nil)
+    command(browser, :post, "/window", %{handle: page})
+  end
+
   # As WebDriver writes them.
   @keys %{tab: "\uE004", enter: "\uE007", left: "\uE012", down: "\uE015", f8: "\uE038"}
 

@@ -3,9 +3,9 @@ defmodule Console.Page.Request do
   # Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
   # scenes as JSON and says its lines (`Console.Page.Line`). Runs in mochiweb's processes, one a connection.
   # Debian's package; without it there is no page.
-  @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_websocket]}
+  @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_socket, :mochiweb_websocket]}
   alias Console.Page
-  alias Console.Page.{About, Client, Feed, Line, State}
+  alias Console.Page.{About, Client, Door, Feed, Line, State}
   alias Console.{Orders, Prompt}
 
   @folder Path.expand("../../../priv/page", __DIR__)
@@ -33,28 +33,43 @@ defmodule Console.Page.Request do
     {"Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'"}
   ]
 
-  # How long a browser may take to read what was sent before its connection is closed.
-  @send_timeout_ms 10_000
+  # How often a browser is asked for a sign of life, which it gives by itself: an empty ping.
+  @ping_ms 5_000
+  @ping <<0x89, 0>>
 
-  @doc "Answers one request; `page` has the robots and the token."
+  @doc "Answers one request; `page` has the robots, the door and what guards it (`t:Console.Page.Access.guard/0`)."
   @spec answer(term(), map()) :: term()
   def answer({:mochiweb_request, _state} = request, page) do
     path = request |> get(:path) |> List.to_string()
+    asked = asked(request, page)
 
     with "GET" <- request |> get(:method) |> to_string(),
-         :ok <- Page.Access.check(asked(request), page.token) do
+         :ok <- Page.Access.check(asked, page) |> guessed(asked, page) do
+      Door.note(page.door, :busy)
       serve(path, request, page)
+      Door.note(page.door, :idle)
     else
       {status, line} -> say(request, status, line)
       method -> say(request, 405, "#{method} is not understood here; GET is")
     end
   end
 
-  defp asked(request) do
+  defp guessed(:guess, asked, page) do
+    case Door.guess(page.door, asked.token) do
+      :ok -> :ok
+      :wrong -> {401, "this is not the page's token: open the page with ?token=…"}
+      :late -> {429, "too many wrong tokens came from there: wait some seconds"}
+    end
+  end
+
+  defp guessed(answer, _asked, _page), do: answer
+
+  defp asked(request, page) do
     %{
       host: header(request, "Host"),
       origin: header(request, "Origin"),
-      token: query(request, "token") || cookie(request)
+      token: query(request, "token"),
+      session: cookie(request, page)
     }
   end
 
@@ -91,51 +106,65 @@ defmodule Console.Page.Request do
   # The token in the address is needed once.
   defp entered(_request, %{token: nil}), do: []
 
-  defp entered(request, %{token: token}) do
+  defp entered(request, page) do
     if query(request, "token"),
       do: [
-        {"Set-Cookie", "token=#{URI.encode_www_form(token)}; HttpOnly; SameSite=Strict; Path=/"}
+        {"Set-Cookie",
+         "#{cookie_name(page)}=#{page.session}; HttpOnly; SameSite=Strict; Path=/" <>
+           secure(request, page)}
       ],
       else: []
   end
 
-  defp live(request, %{page: page, robots: robots}) do
+  # A cookie of HTTPS does not go over the line in the clear.
+  defp secure(request, %{origin: "https:" <> _ = origin}),
+    do: if(Page.Access.proxy?(header(request, "Host") || "", origin), do: "; Secure", else: "")
+
+  defp secure(_request, _page), do: ""
+
+  defp live(request, %{page: page, robots: robots, door: door}) do
     feed = Feed.of(page)
     socket = get(request, :socket)
-
-    _closed_or_not =
-      :inet.setopts(socket, send_timeout: @send_timeout_ms, send_timeout_close: true)
-
     {reentry, reply} = :mochiweb_websocket.upgrade_connection(request, &hear/3)
+    Door.note(door, :live)
     reply.(Feed.map(feed))
     {:ok, client} = Client.start_link(feed, reply)
     {:ok, orders} = Orders.start_link(&reply.(State.answer(&1, &2)))
-    _pusher = spawn_link(fn -> push(feed, reply) end)
-    reentry.(%{client: client, orders: orders, robots: robots, source: Feed.source(feed)})
+    ping = fn -> :mochiweb_socket.send(socket, @ping) end
+    _pusher = spawn_link(fn -> push(feed, reply, ping) end)
+    source = Feed.source(feed)
+    reentry.(%{client: client, orders: orders, robots: robots, source: source, door: door})
   end
 
   # Ends with the connection, and the connection with the feed: the page then says that what it shows is old, and asks
   # again.
-  defp push(feed, reply) do
+  defp push(feed, reply, ping) do
     _ref = Process.monitor(feed)
-    pushed(feed, reply)
+    :ok = Feed.next(feed)
+    pushed(feed, reply, ping, Hal.Clock.now_ms() + @ping_ms)
   end
 
-  defp pushed(feed, reply) do
-    :ok = Feed.next(feed)
-
+  defp pushed(feed, reply, ping, due_ms) do
     receive do
       {:scene, json} ->
-        with :ok <- reply.(json),
-             do: pushed(feed, reply),
-             else: (error -> exit({:shutdown, error}))
+        written(reply.(json))
+        :ok = Feed.next(feed)
+        pushed(feed, reply, ping, due_ms)
 
       {:DOWN, _ref, :process, ^feed, _reason} ->
         exit({:shutdown, :no_feed})
+    after
+      max(due_ms - Hal.Clock.now_ms(), 0) ->
+        written(ping.())
+        pushed(feed, reply, ping, due_ms + @ping_ms)
     end
   end
 
+  defp written(:ok), do: :ok
+  defp written(error), do: exit({:shutdown, error})
+
   defp hear(frames, s, reply) do
+    Door.note(s.door, :live)
     Enum.each(frames, &line(&1, s, reply))
     s
   end
@@ -178,7 +207,12 @@ defmodule Console.Page.Request do
   end
 
   defp query(request, name), do: found(:mochiweb_request.parse_qs(request), name)
-  defp cookie(request), do: found(:mochiweb_request.parse_cookie(request), "token")
+
+  # Ports of one host share their cookies.
+  defp cookie(request, page),
+    do: found(:mochiweb_request.parse_cookie(request), cookie_name(page))
+
+  defp cookie_name(page), do: "convoy_#{page.port}"
 
   defp found(pairs, name) do
     with {_name, value} <- List.keyfind(pairs, String.to_charlist(name), 0), do: to_string(value)

@@ -1,7 +1,7 @@
 defmodule Console.Teleop.Gamepad do
   @moduledoc false
-  # Drives a robot by a gamepad: ten words a second while a shoulder button is held (`Console.Teleop.Joystick`), one word to stand
-  # when it is let go or the gamepad is gone.
+  # Drives a robot by a gamepad: ten words a second while a shoulder button is held and the gamepad is heard
+  # (`Console.Teleop.Joystick`), one word to stand when it is let go, falls silent or is gone.
   #
   # Debian's `cat` reads the device, so that no thread of the VM waits in it.
   use GenServer, restart: :temporary
@@ -54,8 +54,10 @@ defmodule Console.Teleop.Gamepad do
 
   @impl GenServer
   def handle_info({port, {:data, bytes}}, %{port: port} = s) do
-    s = %{s | pad: Joystick.take(s.pad, bytes)}
-    if s.driving? or Joystick.stick(s.pad) == nil, do: {:noreply, s}, else: {:noreply, word(s)}
+    now_ms = Hal.Clock.now_ms()
+    s = put_pad(s, Joystick.take(s.pad, bytes, now_ms))
+    idle? = s.driving? or Joystick.stick(s.pad, now_ms) == nil
+    {:noreply, if(idle?, do: s, else: word(s))}
   end
 
   def handle_info({port, {:exit_status, _status}}, %{port: port} = s) do
@@ -68,7 +70,9 @@ defmodule Console.Teleop.Gamepad do
 
   # The first without a hand is the word to stand.
   defp word(s) do
-    stick = Joystick.stick(s.pad)
+    now_ms = Hal.Clock.now_ms()
+    s = put_pad(s, Joystick.pass(s.pad, now_ms))
+    stick = Joystick.stick(s.pad, now_ms)
     if stick, do: Process.send_after(self(), :word, @word_ms)
     s = %{s | driving?: stick != nil}
 
@@ -77,6 +81,21 @@ defmodule Console.Teleop.Gamepad do
       {:error, line} -> refused(s, line)
     end
   end
+
+  # A person is told once why the robot does not go although the button is held.
+  defp put_pad(s, pad) do
+    if pad.why not in [nil, s.pad.why], do: s.tell.(why(pad, s))
+    %{s | pad: pad}
+  end
+
+  defp why(%{why: :silent} = pad, s) do
+    "#{s.robot} stands: the gamepad said nothing for #{Joystick.silence_ms(pad) / 1_000} s. Let go of the shoulder button and " <>
+      "press it again; a gamepad tells changes only, so move its stick or press any button once a second"
+  end
+
+  defp why(%{why: :not_seen_up}, s),
+    do:
+      "#{s.robot} stands: the shoulder button was down before the gamepad was heard. Let go of it, and press it again"
 
   # Once, not ten times a second.
   defp refused(%{refused: line} = s, line), do: s

@@ -17,6 +17,10 @@ defmodule Console.Teleop.Keys do
   @first 0.6
   @step 0.2
 
+  @arrows %{"A" => "w", "B" => "s", "C" => "d", "D" => "a"}
+  # After `\e[`, up to the letter or `~` that ends it; the second bracket is of the Linux console's F1 to F5.
+  @parameters Enum.map(?0..??, &<<&1>>) ++ ["["]
+
   @enforce_keys [:robot]
   defstruct @enforce_keys ++ [share: @first, escape: ""]
 
@@ -47,18 +51,29 @@ defmodule Console.Teleop.Keys do
   """
   @spec key(t(), String.t()) ::
           {nil | {:word, Console.Teleop.stick()} | :speed | :estop | :leave, t()}
-  def key(%{escape: escape} = keys, char)
-      when (escape <> char) in ["\e", "\e[", "\eO", "\e[1", "\e[19"],
-      do: {nil, %{keys | escape: escape <> char}}
+  def key(keys, "\e"), do: {nil, %{keys | escape: "\e"}}
 
-  def key(%{escape: ""} = keys, char), do: said(keys, char)
-  def key(%{escape: "\e[19"} = keys, "~"), do: said(keys, "e")
-  def key(keys, "A"), do: said(keys, "w")
-  def key(keys, "B"), do: said(keys, "s")
-  def key(keys, "C"), do: said(keys, "d")
-  def key(keys, "D"), do: said(keys, "a")
-  # Escape was a key of its own.
-  def key(keys, char), do: said(keys, char)
+  def key(%{escape: "\e"} = keys, char) when char in ["[", "O"],
+    do: {nil, %{keys | escape: "\e" <> char}}
+
+  # Escape was a key of its own. What stops is heard in the middle of a sequence, too: none has it.
+  def key(%{escape: escape} = keys, char)
+      when escape in ["", "\e"] or char <= " " or char == "e",
+      do: said(keys, char)
+
+  def key(%{escape: escape} = keys, char) do
+    cond do
+      escape in ["\e[", "\eO"] and is_map_key(@arrows, char) -> said(keys, @arrows[char])
+      # Parameters: another key, or an arrow with a modifier.
+      escape != "\eO" and char in @parameters -> {nil, %{keys | escape: longer(escape, char)}}
+      char == "~" and escape =~ ~r/^\e\[19(;|$)/ -> said(keys, "e")
+      # The end of another key: F4 ends with S, Ctrl and left with D.
+      true -> {nil, %{keys | escape: ""}}
+    end
+  end
+
+  # No key has more.
+  defp longer(escape, char), do: if(byte_size(escape) < 16, do: escape <> char, else: escape)
 
   defp said(%{share: share} = keys, char) do
     keys = %{keys | escape: ""}

@@ -109,9 +109,10 @@ defmodule Console.Terminal.Session do
   defp page(_session, %{page: :off}), do: []
 
   defp page(%{module: module, live: live}, options) do
-    where = [port: options.page, address: options.page_address, token: options.page_token]
+    where = [port: options.page, address: options.page_address]
+    who = [token: options.page_token, origin: options.page_origin]
 
-    case Page.start_link([module: module, live: live, robots: options.robots] ++ where) do
+    case Page.start_link([module: module, live: live, robots: options.robots] ++ where ++ who) do
       {:ok, _page, url} -> ["Page:  " <> url]
       {:error, line} -> ["no page: " <> line]
     end

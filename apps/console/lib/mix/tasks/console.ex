@@ -14,8 +14,7 @@ defmodule Mix.Tasks.Console do
   @impl Mix.Task
   def run(arguments) do
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
-      options =
-        Map.merge(%{"page-address" => {127, 0, 0, 1}, "page-token" => nil}, Map.new(pairs))
+      options = Map.merge(%{"page-address" => {127, 0, 0, 1}}, Map.new(pairs))
 
       if options["help"], do: IO.write(help()), else: options |> serve() |> refused()
     else
@@ -28,7 +27,7 @@ defmodule Mix.Tasks.Console do
       {"connect", "NAME@HOST", &connect/1,
        "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
       {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
-    ] ++ Console.Options.Page.table()
+    ] ++ Console.Options.Page.table(System.get_env("CONVOY_FROM", "."))
   end
 
   defp help do
@@ -53,7 +52,7 @@ defmodule Mix.Tasks.Console do
   defp serve(options) do
     Mix.Task.run("app.start", ["--no-compile"])
 
-    with :ok <- Console.Options.Page.check(options["page-address"], options["page-token"]),
+    with :ok <- allowed(options),
          :ok <- mesh(),
          {:ok, live} <- Live.Mesh.start_link(connect: expected(options["connect"])),
          {:ok, _page, url} <- Page.start_link(page(options, live)) do
@@ -62,6 +61,14 @@ defmodule Mix.Tasks.Console do
     end
   end
 
+  defp allowed(options),
+    do:
+      Console.Options.Page.check(
+        options["page-address"],
+        options["page-token-file"],
+        options["page-origin"]
+      )
+
   defp page(options, live) do
     [
       module: Live.Mesh,
@@ -69,7 +76,8 @@ defmodule Mix.Tasks.Console do
       robots: fn -> Live.Mesh.robots(live) end,
       port: Map.get(options, "page", 0),
       address: options["page-address"],
-      token: options["page-token"]
+      token: options["page-token-file"],
+      origin: options["page-origin"]
     ]
   end
 

@@ -1,6 +1,5 @@
 defmodule Mesh.Secret.File do
-  @moduledoc false
-  # Reads the file of a fleet's secret, only if it is safe, and writes it for its owner alone.
+  @moduledoc "Reads the file of a secret, such as a fleet's, only if it is safe, and writes it for its owner alone."
   import Bitwise
 
   # The longest text that can be a good secret, including line ends, is far shorter.

@@ -1,8 +1,9 @@
 defmodule Mesh.Distribution.Access.Bucket do
-  @moduledoc false
-  # Limits the rate of one address by a token bucket. Pure; time in ms.
-  #
-  # An address may take `most` at once, and `per_minute` in the long run.
+  @moduledoc """
+  Limits the rate of one address by a token bucket. Pure; time in ms.
+
+  An address may take `most` at once, and `per_minute` in the long run.
+  """
 
   @typedoc "Thousandths of a token, and when they were counted."
   @type t :: {milli :: non_neg_integer(), at_ms :: integer()}
