@@ -30,7 +30,7 @@ defmodule Mesh.Environment do
 
   # Checked by those that read them: names, paths, and what scripts tell each other.
   @others ~w(CONVOY_HOST CONVOY_NODE CONVOY_SECRET_FILE CONVOY_ROBOT_FILE CONVOY_ENV_FILE CONVOY_CERTS CONVOY_CERTS_DIR) ++
-            ~w(CONVOY_RELEASE CONVOY_RES_OPTIONS CONVOY_PAGE_TOKEN)
+            ~w(CONVOY_RELEASE CONVOY_RES_OPTIONS)
   # Those of builds and tests.
   @development ~w(CONVOY_BUILD CONVOY_DEPS CONVOY_FAILED CONVOY_FROM CONVOY_MCAP CONVOY_PHOTOS CONVOY_PYTHON) ++
                  ~w(CONVOY_ROOTS CONVOY_RUN CONVOY_SKIPPED CONVOY_SOAK)

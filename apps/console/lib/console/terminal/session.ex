@@ -5,7 +5,7 @@ defmodule Console.Terminal.Session do
   # One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
   # decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Orders` has
   # orders carried out.
-  alias Console.{Demo, Options, Orders, Page, Picture, Report, Teleop, Terminal}
+  alias Console.{Demo, Gamepad, Options, Orders, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Console.Prompt
@@ -261,7 +261,7 @@ defmodule Console.Terminal.Session do
     me = self()
     told = [robot: robot, path: path, tell: &send(me, {:gamepad, &1})]
 
-    case Teleop.Gamepad.start_link([module: session.module, live: session.live] ++ told) do
+    case Gamepad.start_link([module: session.module, live: session.live] ++ told) do
       {:ok, pad} -> {%{session | gamepad: pad}, "hold a shoulder button, and drive by the stick"}
       {:error, line} -> {:error, line}
     end

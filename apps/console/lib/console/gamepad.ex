@@ -1,11 +1,12 @@
-defmodule Console.Teleop.Gamepad do
+defmodule Console.Gamepad do
   @moduledoc false
   # Drives a robot by a gamepad: ten words a second while a shoulder button is held and the gamepad is heard
   # (`Console.Teleop.Joystick`), one word to stand when it is let go, falls silent or is gone.
   #
-  # Debian's `cat` reads the device, so that no thread of the VM waits in it.
+  # Debian's `cat` reads the device, so that no thread of the VM waits in it. What is heard is not held up by a robot that does
+  # not answer: words wait elsewhere (`Console.Orders`).
   use GenServer, restart: :temporary
-  alias Console.Teleop
+  alias Console.Orders
   alias Console.Teleop.Joystick
 
   @word_ms 100
@@ -49,7 +50,10 @@ defmodule Console.Teleop.Gamepad do
   def init(options) do
     cat = System.find_executable("cat")
     port = Port.open({:spawn_executable, cat}, [:binary, :exit_status, args: [options.path]])
-    {:ok, Map.merge(options, %{port: port, pad: %Joystick{}, driving?: false, refused: nil})}
+    me = self()
+    {:ok, orders} = Orders.start_link(&send(me, {:answered, &1, &2}))
+    own = %{port: port, orders: orders, pad: %Joystick{}, driving?: false, refused: nil}
+    {:ok, Map.merge(options, own)}
   end
 
   @impl GenServer
@@ -62,11 +66,18 @@ defmodule Console.Teleop.Gamepad do
 
   def handle_info({port, {:exit_status, _status}}, %{port: port} = s) do
     s = if s.driving?, do: word(%{s | pad: %Joystick{}}), else: s
+    :ok = Orders.settle(s.orders)
     s.tell.("the gamepad at #{s.path} is gone; it drives #{s.robot} no more")
     {:stop, :normal, s}
   end
 
   def handle_info(:word, s), do: {:noreply, word(s)}
+
+  # Once, not ten times a second.
+  def handle_info({:answered, _word, {:error, line}}, s) do
+    if line != s.refused, do: s.tell.(line)
+    {:noreply, %{s | refused: line}}
+  end
 
   # The first without a hand is the word to stand.
   defp word(s) do
@@ -74,12 +85,10 @@ defmodule Console.Teleop.Gamepad do
     s = put_pad(s, Joystick.pass(s.pad, now_ms))
     stick = Joystick.stick(s.pad, now_ms)
     if stick, do: Process.send_after(self(), :word, @word_ms)
-    s = %{s | driving?: stick != nil}
-
-    case s.module.command(s.live, Teleop.order(s.robot, stick || {0.0, 0.0}, :gamepad)) do
-      {:ok, _accepted} -> %{s | refused: nil}
-      {:error, line} -> refused(s, line)
-    end
+    source = {s.module, s.live}
+    now_us = System.monotonic_time(:microsecond)
+    Orders.give(s.orders, Orders.of_word(s.robot, stick || {0.0, 0.0}, :gamepad, source, now_us))
+    %{s | driving?: stick != nil, refused: if(s.driving?, do: s.refused)}
   end
 
   # A person is told once why the robot does not go although the button is held.
@@ -96,12 +105,4 @@ defmodule Console.Teleop.Gamepad do
   defp why(%{why: :not_seen_up}, s),
     do:
       "#{s.robot} stands: the shoulder button was down before the gamepad was heard. Let go of it, and press it again"
-
-  # Once, not ten times a second.
-  defp refused(%{refused: line} = s, line), do: s
-
-  defp refused(s, line) do
-    s.tell.(line)
-    %{s | refused: line}
-  end
 end
