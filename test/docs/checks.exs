@@ -55,7 +55,7 @@ defmodule Docs.Checks do
     "mix bench swarm --nodes 3,10 --robots-in-one-node 100" => @long,
     "mix bench swarm --nodes 30 --robots-in-one-node 0" => @long,
     "mix bench vision --beside CMVision" => "it needs a program of others",
-    "mix blobs /dev/video0 --colours landmark.txt --picture out.png" => @device,
+    "mix blobs /dev/video0 --colours config/robots/landmark.txt --picture out.png" => @device,
     "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --picture look.png" =>
       @device,
     "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --colours config/robots/landmark.txt" =>

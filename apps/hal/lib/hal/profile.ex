@@ -2,7 +2,7 @@ defmodule Hal.Profile do
   @moduledoc """
   Describes the body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in `base_link`.
 
-  Sources: the thesis (R69 to R72) and the public rFLEX sample configurations. The accelerations
+  Sources: the thesis and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
 
   `sonar_round_s` is how long the sonars take until each has fired and was reported, in seconds: so old is a range at most
@@ -82,7 +82,7 @@ defmodule Hal.Profile do
 
   @doc """
   ATRV mini: four driven wheels, 0.5 by 0.3 m; 16 sonars, dense in front and at the sides, two
-  behind and none diagonally behind (R71). `radius` is that of the circle around its corners.
+  behind and none diagonally behind. `radius` is that of the circle around its corners.
 
       iex> Hal.Profile.atrv_mini().max_turn
       0.8

@@ -1,6 +1,6 @@
 defmodule Missions.Explore do
   @moduledoc """
-  Explores: robots see all of a building that they do not know, and make its map together (R92). Pure; written with the
+  Explores: robots see all of a building that they do not know, and make its map together. Pure; written with the
   interface of `Robot.Mission` alone.
 
   Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that

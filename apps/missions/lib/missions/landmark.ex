@@ -1,6 +1,6 @@
 defmodule Missions.Landmark do
   @moduledoc """
-  Carries out the landmark mission (R58 to R60): searches for the landmark, agrees on who sees it largest, and follows
+  Carries out the landmark mission: searches for the landmark, agrees on who sees it largest, and follows
   that robot in formation while a person moves the landmark. Pure: events in, effects out.
   `Missions.Landmark.Transitions` is the table of its phases, with its `.Conditions` and what a phase begins with
   (`.Entry`); the parts of the mission are modules of their own:

@@ -1,7 +1,7 @@
 defmodule Missions.Patrol do
   @moduledoc """
-  Patrols: points are visited for ever by a fleet without a leader, by ALLIANCE's motivations (R97,
-  `Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
+  Patrols: points are visited for ever by a fleet without a leader, by ALLIANCE's motivations
+  (`Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
   `Robot.Mission` alone.
 
   A point is due when nobody has seen it for a quarter of the `period`; whoever is within 0.5 m of it sees it. Each robot

@@ -1,6 +1,6 @@
 defmodule Missions.Teleop do
   @moduledoc """
-  Lets a person drive a robot, by keyboard or gamepad (R17, R75). It stands until somebody says `move`, drives while
+  Lets a person drive a robot, by keyboard or gamepad. It stands until somebody says `move`, drives while
   that is said again, and stands again when nobody has said it for `dead_man` seconds, whatever is gone: the hand, the
   window, its machine or the network. Pure; written with the interface of `Robot.Mission` alone.
 

@@ -5,7 +5,7 @@ defmodule Robot.Behaviour do
 
   A running behaviour is a pair `{module, state}`, so that behaviours can hold, start and combine
   others (`Robot.Behaviour.Sequence`, `.Parallel`, `.Fsm`, …). It runs until it reports an
-  outcome, an integer as in the thesis (R12), by which combinators choose what comes next.
+  outcome, an integer as in the thesis, by which combinators choose what comes next.
   """
   alias Hal.Options.Type
   alias Robot.{Percept, Wish}

@@ -1,6 +1,6 @@
 defmodule Robot.Command do
   @moduledoc """
-  Parses text commands from a person to a robot, in the colon notation of the thesis (R24, R25): a case-insensitive
+  Parses text commands from a person to a robot, in the colon notation of the thesis: a case-insensitive
   keyword and its arguments. Pure; parsing never creates atoms from its input and does not raise.
 
   | text | command |

@@ -1,6 +1,6 @@
 defmodule Swarm.Camera do
   @moduledoc """
-  Describes what a robot's camera sees, for people, as JPEG (R103).
+  Describes what a robot's camera sees, for people, as JPEG.
 
       {:ok, jpeg} = Swarm.Camera.snapshot(:mag1)
       File.write!("mag1.jpg", jpeg)

@@ -5,8 +5,8 @@ defmodule Vision.Blob do
   Pixels are counted from the top left; `left` and `top` are the first pixel inside, `right` and
   `bottom` the last one **inside**. `x`, `y` are the centroid, with pixel centres at whole
   numbers. `width` and `height` are those of the frame, and `share` is the area as a part of the
-  frame's (R41). `clipped?` says that the box touches the border of the frame, so that area and
-  distance mean little. `distance` (metres, R43) is `nil` if the colour has no distance constant,
+  frame's. `clipped?` says that the box touches the border of the frame, so that area and
+  distance mean little. `distance` (metres) is `nil` if the colour has no distance constant,
   or if the blob fills more than half of the frame.
   """
 

@@ -12,7 +12,7 @@ defmodule Vision.Filter do
   alias Vision.Blob
 
   @doc """
-  Drops phantoms (R38): blobs whose frame has another size than the camera's, blobs that are
+  Drops phantoms: blobs whose frame has another size than the camera's, blobs that are
   larger than their frame, and blobs whose box lies outside it. An old simulator reports one of
   22648 by 5 pixels whenever it sees nothing.
 
@@ -34,7 +34,7 @@ defmodule Vision.Filter do
   end
 
   @doc """
-  Keeps the blobs of one colour (R39): a camera sees the other robots too.
+  Keeps the blobs of one colour: a camera sees the other robots too.
 
       iex> Vision.Filter.colour([], "YellowLandmark")
       []
@@ -42,19 +42,19 @@ defmodule Vision.Filter do
   @spec colour([Blob.t()], String.t()) :: [Blob.t()]
   def colour(blobs, name), do: Enum.filter(blobs, &(&1.colour == name))
 
-  @doc "Drops blobs with fewer pixels (R40): camera noise."
+  @doc "Drops blobs with fewer pixels: camera noise."
   @spec least_area([Blob.t()], non_neg_integer()) :: [Blob.t()]
   def least_area(blobs, area), do: Enum.filter(blobs, &(&1.area >= area))
 
   @doc """
-  Drops blobs with a smaller share of their frame (R41), which means the same for pictures of any
+  Drops blobs with a smaller share of their frame, which means the same for pictures of any
   size.
   """
   @spec least_share([Blob.t()], float()) :: [Blob.t()]
   def least_share(blobs, share), do: Enum.filter(blobs, &(&1.share >= share))
 
   @doc """
-  The blob with the largest share (R40); the first of equals, and `nil` for an empty list.
+  The blob with the largest share; the first of equals, and `nil` for an empty list.
 
       iex> Vision.Filter.largest([])
       nil

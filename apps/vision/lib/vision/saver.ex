@@ -1,6 +1,6 @@
 defmodule Vision.Saver do
   @moduledoc """
-  Saves pictures of a camera in a folder (R103): a viewer of `Vision.View` that writes what it
+  Saves pictures of a camera in a folder: a viewer of `Vision.View` that writes what it
   receives. The newest are kept and the oldest deleted (`Vision.Saver.Retention`); other files in
   the folder are left alone.
 

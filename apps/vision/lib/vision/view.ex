@@ -1,6 +1,6 @@
 defmodule Vision.View do
   @moduledoc """
-  Pictures for people (R103): the frames of a camera as JPEG, made only while there is a viewer.
+  Pictures for people: the frames of a camera as JPEG, made only while there is a viewer.
 
       {:ok, ref} = Vision.View.subscribe(view, rate: 5)
       receive do {:picture, ^ref, %Vision.View.Picture{jpeg: jpeg}} -> jpeg end

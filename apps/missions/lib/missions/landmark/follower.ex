@@ -120,7 +120,7 @@ defmodule Missions.Landmark.Follower do
   defp landmark(%{anchor: anchor, follower: follower}, in_place?),
     do: if(in_place? or follower.landmark == nil, do: anchor.landmark, else: follower.landmark)
 
-  # From parent to child: n - 1 messages for the whole group (R28, R53).
+  # From parent to child: n - 1 messages for the whole group.
   defp pass_on(%{anchor: anchor, follower: follower} = mission) do
     news = {anchor.epoch, anchor.sequence}
     child = Chain.child([anchor.leader | anchor.order], mission.me)

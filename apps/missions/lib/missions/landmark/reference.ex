@@ -2,7 +2,7 @@ defmodule Missions.Landmark.Reference do
   @moduledoc """
   Says where the leader is supposed to be, and the shape relative to it: everything that a follower
   needs to compute its slot. The leader makes a new reference each tick; it travels in the
-  leader's claim and, from parent to child, along the chain (R28, R53: n - 1 messages), so
+  leader's claim and, from parent to child, along the chain (n - 1 messages), so
   that a follower that does not hear the leader still knows its place. The newest sequence number
   wins; the epoch excludes former leaders.
 

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.Rounds do
 
   A round is opened for two purposes. `:search`: everybody reports after its scan. `:change`:
   everybody reports at once what it sees now, because the leader is gone, or another robot has
-  come clearly nearer to the landmark (R76). Leader and
+  come clearly nearer to the landmark. Leader and
   followers stand still while a round is open, searchers once they have scanned.
   """
   alias Swarm.{Formation, Message}

@@ -3,7 +3,7 @@ defmodule Missions.Landmark.SlotPoses do
   Computes one robot's slot from the leader's reference: its pose in the map frame, and its
   velocity. Pure.
 
-  A robot follows where the leader is supposed to be (R53): the anchor's pose, extrapolated by its
+  A robot follows where the leader is supposed to be: the anchor's pose, extrapolated by its
   speed for as long as it has been under way, half a second at most.
   """
   alias Hal.{Pose, Twist}

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Transitions do
   @moduledoc """
-  Describes the mission as one table (R59): what a robot does in each phase, and which conditions end it. Conditions are
+  Describes the mission as one table: what a robot does in each phase, and which conditions end it. Conditions are
   checked in the order of the row; the first that holds wins. To insert a phase, insert a row. A stop is not in the
   table: it ends the mission from outside, in every phase, and leaves it `:idle`. `:rest`, `:halt` and `:hold` are phases of this
   mission; elsewhere these words mean something else (docs/glossary.md).

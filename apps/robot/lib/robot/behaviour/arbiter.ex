@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Arbiter do
   @moduledoc """
-  Chooses among wishes (R88): the one with the greatest weight wins. The weight of the behaviour
+  Chooses among wishes: the one with the greatest weight wins. The weight of the behaviour
   that won last counts a tenth more, so that two behaviours of nearly equal weight do not
   alternate; among equal weights the first in the list wins. Pure.
   """

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Avoid do
   @moduledoc """
-  Runs another behaviour, and changes or slows its wishes so that the robot avoids contact (R85).
+  Runs another behaviour, and changes or slows its wishes so that the robot avoids contact.
 
   The velocity of a wish is changed: the robot drives round standing robots and discs on a short
   route (`.Route`), past moving robots by `Robot.Navigation.Orca` (`.Clearance`), a little to the

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Escape do
   @moduledoc """
-  Escapes after a bumper was touched (R50): backs off 0.15 m, away from the touched side, and then
+  Escapes after a bumper was touched: backs off 0.15 m, away from the touched side, and then
   turns away from it. It wishes nothing while nothing is touched, and never ends.
 
   A new touch makes it move, not a bumper that stays pressed: it escapes from each touch once. If

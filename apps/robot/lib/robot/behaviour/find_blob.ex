@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.FindBlob do
   @moduledoc """
-  Looks for a colour (R36): turns left on the spot until the camera shows it, then turns to it.
+  Looks for a colour: turns left on the spot until the camera shows it, then turns to it.
   Outcome 1: found, and the body points at it. Outcome 0: not in view after a full turn, or after
   a time-out.
 

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Follow do
   @moduledoc """
-  Drives to a place that may move, such as a slot of a formation, and stays with it (R34, R49): it
+  Drives to a place that may move, such as a slot of a formation, and stays with it: it
   matches the velocity of the place and adds a correction that closes the gap. Once it has reached
   a target that stands, it turns to the target's heading and stands. It drives again only when the
   target moves or is farther away than a second, larger threshold, to prevent chattering. Never

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Fsm do
   @moduledoc """
-  Runs a finite state machine of behaviours, whose outcomes select the transitions (R11, R12).
+  Runs a finite state machine of behaviours, whose outcomes select the transitions.
 
       Fsm.new(
         start: :search,

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Goto do
   @moduledoc """
-  Goes to a place and optionally turns to a heading there (R33). It turns until it points at the
+  Goes to a place and optionally turns to a heading there. It turns until it points at the
   place, drives, and turns on the spot again only when it points clearly away. The two thresholds
   prevent chattering between turning and driving.
 

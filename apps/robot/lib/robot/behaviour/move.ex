@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Move do
   @moduledoc """
-  Drives at a given speed until replaced (R32). Options: `linear` (m/s), `turn` (rad/s), both
+  Drives at a given speed until replaced. Options: `linear` (m/s), `turn` (rad/s), both
   required, and `for_ms` (default `nil`, no limit), after which it ends with outcome 1.
   """
   @behaviour Robot.Behaviour

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Once do
   @moduledoc """
-  Calls a function with the percept once and ends with the outcome that it returns (R11). It
+  Calls a function with the percept once and ends with the outcome that it returns. It
   serves for checks and for choosing between behaviours. Options: `run`,
   `(Robot.Percept.t() -> integer)` (required).
   """

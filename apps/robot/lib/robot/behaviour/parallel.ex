@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Parallel do
   @moduledoc """
-  Runs behaviours side by side (R11); the wish with the greatest weight counts. It ends when all
+  Runs behaviours side by side; the wish with the greatest weight counts. It ends when all
   have ended, with the outcome of the last, or, with `ends: :any`, when one has ended, with its
   outcome. If several end in the same tick, the last, or the first, in the list counts.
 

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Sequence do
   @moduledoc """
-  Runs behaviours one after another (R11). Its outcome is that of the last one. If `while` is set
+  Runs behaviours one after another. Its outcome is that of the last one. If `while` is set
   to an outcome, the sequence ends as soon as a step ends with another one, and has that outcome.
 
   Options: `steps`, a list of behaviours (required, at least one); `while`, an outcome (default

@@ -1,5 +1,5 @@
 defmodule Robot.Behaviour.Stop do
-  @moduledoc "Ends any movement (R31): wishes to stand, with the greatest weight, until replaced."
+  @moduledoc "Ends any movement: wishes to stand, with the greatest weight, until replaced."
   @behaviour Robot.Behaviour
   alias Hal.Twist
   alias Robot.Wish

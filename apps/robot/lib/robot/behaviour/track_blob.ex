@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.TrackBlob do
   @moduledoc """
-  Keeps a coloured object in view and at a distance (R36, R37, R82), as the leader does with the
+  Keeps a coloured object in view and at a distance, as the leader does with the
   landmark. Never ends.
 
   The camera follows the object. The body begins to turn when the object is more than 30 degrees
@@ -8,7 +8,7 @@ defmodule Robot.Behaviour.TrackBlob do
   degrees. It also turns when it has to drive, because it faces the object while driving. A robot
   without a pan-tilt unit keeps the object in front of its body.
 
-  Measurements from pictures fluctuate (R44), so direction and distance are filtered, and each has
+  Measurements from pictures fluctuate, so direction and distance are filtered, and each has
   two thresholds: the robot starts to turn when it is clearly off and stops when it is well
   centred, and likewise for the distance. In between it stands still. When the object is lost, the
   robot turns to where it was last seen and then on to that side, a little more than a full turn

@@ -7,7 +7,7 @@ defmodule Robot.Localiser.Belief do
 
   | state | meaning |
   |---|---|
-  | slip | the share by which it turns farther left, and less far right, than by odometry (R74) |
+  | slip | the share by which it turns farther left, and less far right, than by odometry |
   | two scales | the shares by which distances are measured too long: to the landmark, to robots |
   | slip of the leader | the same for the leader of the frame, as far as unknown to the leader |
   | common error | the error shared by the places of all robots ahead (sd 1), never estimated |

@@ -1,7 +1,7 @@
 defmodule Robot.Mission.Manual do
   @moduledoc """
-  Runs a person's commands on one robot (`Robot.Command`), one command at a time (R16, R31 to
-  R36). The robot leaves the group's mission for it, and returns to that with the next start.
+  Runs a person's commands on one robot (`Robot.Command`), one command at a time. The
+  robot leaves the group's mission for it, and returns to that with the next start.
   Pure. A mission does not carry out `stop`: the pilot ends this mission like any other.
 
   In its heartbeats the robot stays `:idle`, so that no group waits for it, and names the robot
@@ -13,9 +13,8 @@ defmodule Robot.Mission.Manual do
   where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
-  subscription asks for (R27, R35), so robots refuse a subscription. A follower keeps 1 m behind
-  its leader, stands when it has not heard it for a second, and continues when it hears it again
-  (R34).
+  subscription asks for, so robots refuse a subscription. A follower keeps 1 m behind
+  its leader, stands when it has not heard it for a second, and continues when it hears it again.
   """
   alias Hal.{Pose, Twist}
   alias Robot.{Command, Percept}
@@ -57,7 +56,7 @@ defmodule Robot.Mission.Manual do
     end
   end
 
-  # The robot's status reports the outcome of a command (R12) by its phase.
+  # The robot's status reports the outcome of a command by its phase.
   def handle({:outcome, {:command, count}, outcome}, %{count: count} = mission),
     do: result(%{mission | result: outcome}, [{:claim, %{phase: :idle, standing: true}}])
 
@@ -173,7 +172,7 @@ defmodule Robot.Mission.Manual do
     end
   end
 
-  # A coloured object that is carried before its camera leads it, and others follow (R35).
+  # A coloured object that is carried before its camera leads it, and others follow.
   defp goal(:lead, _percept), do: {Robot.Behaviour.TrackBlob, []}
   defp goal(_unknown, nil), do: nil
 

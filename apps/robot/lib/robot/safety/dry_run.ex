@@ -1,6 +1,6 @@
 defmodule Robot.Safety.DryRun do
   @moduledoc false
-  # Lets a robot run without moving (R44): with `dry_run: true` in `Robot.Config` it perceives, decides and communicates
+  # Lets a robot run without moving: with `dry_run: true` in `Robot.Config` it perceives, decides and communicates
   # as usual, but commands for the wheels and the camera's head are printed instead of sent. A person can compare them
   # with what they expect before the wheels may turn.
   #

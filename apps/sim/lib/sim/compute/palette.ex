@@ -15,7 +15,7 @@ defmodule Sim.Compute.Palette do
           constant: float()
         }
 
-  # A pole of 0.3 x 1 m at 1 m would fill 0.3 of the picture, but its dark edges are lost (R43).
+  # A pole of 0.3 x 1 m at 1 m would fill 0.3 of the picture, but its dark edges are lost.
   @landmark_constant 0.25
   @robot_constant 0.2
   @landmark_luma 170

@@ -162,7 +162,7 @@ defmodule Sim.Trial.Setup do
     {Missions.Landmark, Keyword.merge(own, shared)}
   end
 
-  # R66: all robots are switched on at the first one's place, and then driven by hand to their
+  # All robots are switched on at the first one's place, and then driven by hand to their
   # own; their wheels count that distance too, with their errors.
   defp common_start(%{start: :same}, [{_id, pose} | _rest]), do: pose
   defp common_start(_options, _robots), do: nil

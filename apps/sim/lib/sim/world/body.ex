@@ -8,7 +8,7 @@ defmodule Sim.World.Body do
   #
   # Odometry has errors according to `noise`: `:default` draws for each robot a scale error and a
   # turn error of 0.3 %, of either sign, and adds 1e-6 m2 of variance per metre to each wheel;
-  # `:slip` adds the behaviour of skid-steered bases (R74): a turn to the left goes 5.5 % further
+  # `:slip` adds the behaviour of skid-steered bases: a turn to the left goes 5.5 % further
   # than the wheels say, a turn to the right 5.5 % less far, and each turn has a random error of 1.7
   # % more (1.5 degrees in 90).
   #

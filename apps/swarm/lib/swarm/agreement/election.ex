@@ -3,7 +3,7 @@ defmodule Swarm.Agreement.Election do
   Elects the leader: a pure function of the committed record, so that all robots get the same
   answer.
 
-  Among those that may lead at all, the one of the greatest merit wins (R48: the landmark mission's
+  Among those that may lead at all, the one of the greatest merit wins (the landmark mission's
   is how large a robot sees the landmark); ties go to the first name. If two or more leaders report,
   parts of a fleet have met, and the one with the highest {robots led, merit, name} leads all: the
   fewest have to turn to another.

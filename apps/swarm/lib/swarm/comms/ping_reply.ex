@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.PingReply do
   @moduledoc false
-  # Words a robot's answer to `ping` (R16): its name, how long it has been up, and its state and for how
+  # Words a robot's answer to `ping`: its name, how long it has been up, and its state and for how
   # long. Pure, except for `line/3`, which reads the robot's board.
   alias Robot.Board
   alias Swarm.Status

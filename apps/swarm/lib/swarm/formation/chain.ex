@@ -1,8 +1,8 @@
 defmodule Swarm.Formation.Chain do
   @moduledoc """
-  Orders robots by the thesis's chain: the child of each robot is the one with the next greater distance to the leader
-  (R52), which each robot computes from the same poses. Equal distances are ordered by id, so that any poses give a
-  unique chain. Pure; places in mm, as reported.
+  Orders robots by the thesis's chain: the child of each robot is the one with the next greater distance to the leader,
+  which each robot computes from the same poses. Equal distances are ordered by id, so that any poses give a unique chain.
+  Pure; places in mm, as reported.
   """
 
   @type millimetres :: {integer(), integer()}

@@ -18,7 +18,7 @@ defmodule Missions.Landmark.Leader.Slots do
   @spec update(Landmark.State.t()) :: Landmark.State.t()
   def update(mission), do: mission |> muster() |> shape()
 
-  # Robots that are gone leave their slots and those behind move up (R53 with healing); new ones
+  # Robots that are gone leave their slots and those behind move up; new ones
   # join the tail.
   defp muster(mission) do
     view = List.delete(Rounds.view(mission), mission.me)

@@ -1,6 +1,6 @@
 defmodule Missions.Landmark.Rounds.Challenge do
   @moduledoc false
-  # Decides when a follower asks for a new leader (R76): it sees the landmark nearer than the leader
+  # Decides when a follower asks for a new leader: it sees the landmark nearer than the leader
   # does, by 0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while
   # this robot does. No leader is challenged in its first 10 s, so that leadership cannot oscillate;
   # and as long as the landmark has not moved, a robot that passes it on the way to its slot does

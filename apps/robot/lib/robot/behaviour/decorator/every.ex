@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Decorator.Every do
   @moduledoc """
-  Runs another behaviour repeatedly (R11): starts it again `period_ms` after its last start, or at
+  Runs another behaviour repeatedly: starts it again `period_ms` after its last start, or at
   the tick after its end, whichever is later. Never ends by itself.
 
   Options: `start`, `{module, options}` of the behaviour (required); `period_ms` (default 0).

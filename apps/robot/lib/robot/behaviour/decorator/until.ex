@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Decorator.Until do
   @moduledoc """
-  Runs another behaviour until a condition holds (R11). Outcome: that of the inner behaviour if it
+  Runs another behaviour until a condition holds. Outcome: that of the inner behaviour if it
   ends first, else `outcome` (default 2).
 
   Options: `inner`, a behaviour (required); the condition, at least one of `stop?`, a function of

@@ -20,7 +20,7 @@ defmodule Sim.Emulator.RFlexController.Options do
   | `:escape` | `:drop`, `:take` | turn commands with 1B in their top or third byte are lost, or not (`:drop`) |
   | `:pace` | `{ms, room}` or `:off` | takes one command every `ms`, and at most `room` may wait (`:off`) |
   | `:give_up_ms` | 1 to 10000 | how long it waits for the rest of a command (50) |
-  | `:phrase` | bytes or `nil` | text on the line that switches it off ("The system is halted", R95) |
+  | `:phrase` | bytes or `nil` | text on the line that switches it off ("The system is halted") |
   | `:power_offset` | volts | true voltage minus reported voltage (0.0; mini 1.2) |
   | `:home` | `{address, from, to}` or `nil` | switch that is closed between two bearings, radians |
   | `:id` | byte | of the first report (0) |
