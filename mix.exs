@@ -15,37 +15,71 @@ defmodule Convoy.MixProject do
     ]
   end
 
-  # The suite of each app in a VM of its own, as bin/test runs them: what one sets does not reach the next. Files are
-  # named from here, or as in their app. All suites are run; it fails if one fails.
+  # Each suite in a VM of its own, as bin/test runs them: what one sets does not reach the next. Without files: the apps, the
+  # projects of examples/, and of the whole system what needs no release, no network of its own and no documents; bin/test has
+  # all. Files are named from here. All suites are run; it fails if one fails.
+  @system ["--except", "release,netns,docs,test_command,test_on"]
+
   defp test(arguments) do
-    {files, options} = Enum.split_with(arguments, &String.starts_with?(&1, "apps/"))
+    {files, options} = Enum.split_with(arguments, &(&1 =~ ~r{/|\.exs(:\d+)?$}))
 
     suites =
-      Enum.group_by(
-        files,
-        &(&1 |> Path.split() |> Enum.at(1)),
-        &(&1 |> Path.split() |> Enum.drop(2) |> Path.join())
-      )
-
-    suites =
-      if suites == %{},
-        do: Map.new(Mix.Project.apps_paths(), fn {app, _path} -> {"#{app}", []} end),
-        else: suites
-
-    for {app, _files} <- suites,
-        not File.dir?("apps/#{app}/test"),
-        do: Mix.raise("apps/#{app} is not an app with tests")
+      if files == [],
+        do: Enum.map(folders(), &{&1, if(&1 == ".", do: @system, else: [])}),
+        else: files |> Enum.group_by(&folder/1) |> Enum.sort_by(&elem(&1, 0), :desc)
 
     failed =
-      for {app, files} <- suites,
-          Mix.shell().info("==> #{app}"),
+      for {folder, files} <- suites,
+          Mix.shell().info("==> #{folder}"),
+          {command, options} = command(folder, options, Enum.map(files, &relative(&1, folder))),
           {_out, status} =
-            System.cmd("mix", ["test" | options ++ files], cd: "apps/#{app}", into: IO.stream()),
+            System.cmd("mix", command ++ options,
+              cd: folder,
+              env: [{"MIX_ENV", "test"}],
+              into: IO.stream()
+            ),
           status != 0,
-          do: app
+          do: folder
 
     if failed != [], do: Mix.raise("tests failed in #{Enum.join(failed, ", ")}")
   end
+
+  defp command(".", options, files),
+    do: {["run", "--no-start", "test/run.exs"], files ++ options}
+
+  defp command(_folder, options, files), do: {["test"], options ++ files}
+
+  defp folders do
+    apps =
+      for {_app, path} <- Enum.sort(Mix.Project.apps_paths()), File.dir?("#{path}/test"), do: path
+
+    projects =
+      for helper <- Enum.sort(Path.wildcard("examples/*/test/test_helper.exs")),
+          do: helper |> Path.dirname() |> Path.dirname()
+
+    apps ++ projects ++ ["."]
+  end
+
+  # The suite that a file or folder belongs to.
+  defp folder(file) do
+    with true <- file |> String.replace(~r/:\d+$/, "") |> File.exists?(),
+         folder when folder != nil <-
+           Enum.find(
+             folders(),
+             &(String.starts_with?(file, &1 <> "/") or
+                 (&1 == "." and String.starts_with?(file, "test/")))
+           ) do
+      folder
+    else
+      _none ->
+        Mix.raise(
+          "#{file} is no test of this project; name a file or folder below apps/, examples/ or test/"
+        )
+    end
+  end
+
+  defp relative(file, "."), do: file
+  defp relative(file, folder), do: String.replace_prefix(file, folder <> "/", "")
 
   # With CONVOY_BUILD=robot, say, only what that release holds is built; else all apps are.
   defp apps(release) do
