@@ -81,7 +81,15 @@ defmodule Convoy.MixProject do
   defp relative(file, "."), do: file
   defp relative(file, folder), do: String.replace_prefix(file, folder <> "/", "")
 
-  # With CONVOY_BUILD=robot, say, only what that release holds is built; else all apps are.
+  # With CONVOY_BUILD=robot, say, only what that release holds is built; with CONVOY_BUILD=demo all but the benchmarks, as
+  # bin/build does it; else all apps are.
+  defp apps("demo") do
+    for mix <- Enum.sort(Path.wildcard("apps/*/mix.exs")),
+        app = mix |> Path.dirname() |> Path.basename(),
+        app != "bench",
+        do: String.to_atom(app)
+  end
+
   defp apps(release) do
     with {_name, options} <- Enum.find(releases(), &(Atom.to_string(elem(&1, 0)) == release)),
          do: for({app, _mode} <- options[:applications], File.dir?("apps/#{app}"), do: app)

@@ -13,7 +13,7 @@ defmodule Console.Prompt do
   alias Robot.Command
   alias Swarm.Missions
 
-  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start replace arm disarm acknowledge pause resume step speed status nodes tell help quit)
+  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start replace arm disarm acknowledge pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -26,6 +26,7 @@ defmodule Console.Prompt do
           | {:gamepad, {atom(), Path.t()} | :off}
           | :help
           | :nodes
+          | :page
           | :status
           | {:status, atom()}
           | :quit
@@ -89,7 +90,7 @@ defmodule Console.Prompt do
   def kind(:estop), do: :stop
   def kind({:tell, _target, word}) when word in ["stop", "disarm"], do: :stop
   def kind({view, _what}) when view in [:drive, :gamepad, :status], do: :view
-  def kind(view) when view in [:help, :nodes, :status, :quit, :nothing], do: :view
+  def kind(view) when view in [:help, :nodes, :page, :status, :quit, :nothing], do: :view
   def kind(_command), do: :order
 
   @doc """
@@ -174,9 +175,10 @@ defmodule Console.Prompt do
         "gamepad mag2, gamepad off     drives it by #{@gamepad}, or by another path",
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
-        "start patrol:period=90        starts another mission: #{Enum.join(Missions.names(), ", ")}",
-        "replace flock                 they stand, change to another mission, and go on;",
-        "replace mag2 patrol           what ends within 10 s goes back (not in lockstep)",
+        "start patrol:period=90        starts another mission:",
+        "                              " <> Enum.join(Missions.names(), ", "),
+        "replace flock                 they stand, change the mission, and go on;",
+        "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "estop, or F8; reset           emergency stop of all, until the reset",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
@@ -186,13 +188,14 @@ defmodule Console.Prompt do
         "acknowledge mag2              somebody has checked why its line was lost"
       ]) ++
       when_offered.(:kill, [
-        "pause, resume                 the run stops, and goes on (in lockstep: --speed)",
+        "pause, resume                 the run stops, and goes on (with --speed)",
         "step, step 10                 so many steps of 0.1 s while it is paused",
-        "speed 0.5, speed max          0.1 to 100 times real time, or as fast as it goes"
+        "speed 0.5, speed max          0.1 to 100 times real time, or its fastest"
       ]) ++
       [
         "status, status mag2           what all robots do",
         "nodes                         the processes, and how to attach to one",
+        "page                          the address of the page for your browser",
         "quit                          ends the demo, as Ctrl-C does; Tab completes"
       ]
   end
@@ -293,6 +296,7 @@ defmodule Console.Prompt do
 
   defp command("status", [], _robots), do: {:ok, :status}
   defp command("nodes", [], _robots), do: {:ok, :nodes}
+  defp command("page", [], _robots), do: {:ok, :page}
   defp command("status", [name], robots), do: with_robot(name, robots, &{:status, &1})
   defp command(word, _rest, _robots) when word in ["help", "?"], do: {:ok, :help}
   defp command(word, _rest, _robots) when word in ["quit", "exit", "q"], do: {:ok, :quit}

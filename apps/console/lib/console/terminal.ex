@@ -17,12 +17,15 @@ defmodule Console.Terminal do
             editor: %Editor{},
             messages: [],
             overlay: nil,
+            turned: 0,
+            page: {0, 0},
             floor: nil,
             pace: nil,
             driving: nil
 
   @typedoc """
-  What the view keeps besides the scene; `messages` are answers, the newest first; `pace` is how fast the run goes;
+  What the view keeps besides the scene; `messages` are answers, the newest first; `overlay` are lines in place of the map,
+  of which so many rows were `turned`, and `page` is what of the others is shown, and left; `pace` is how fast the run goes;
   `driving` stands in place of the prompt while keys drive a robot.
   """
   @type t :: %__MODULE__{
@@ -31,6 +34,8 @@ defmodule Console.Terminal do
           editor: Editor.t(),
           messages: [{String.t(), atom()}],
           overlay: [String.t()] | nil,
+          turned: non_neg_integer(),
+          page: {shown :: non_neg_integer(), left :: non_neg_integer()},
           floor: Canvas.floor() | nil,
           pace: String.t() | nil,
           driving: String.t() | nil
@@ -47,6 +52,15 @@ defmodule Console.Terminal do
   @doc "Three things to try."
   @spec hint() :: String.t()
   def hint, do: @try
+
+  @doc "Shows lines in place of the map."
+  @spec show(t(), [String.t()]) :: t()
+  def show(view, lines), do: %{view | overlay: lines, turned: 0}
+
+  @doc "Turns to the next page of these lines, or back to the map after the last."
+  @spec turn(t()) :: t()
+  def turn(%{page: {shown, left}} = view) when left > 0, do: %{view | turned: view.turned + shown}
+  def turn(view), do: %{view | overlay: nil, turned: 0}
 
   @doc "The whole screen, and the next state of the view."
   @spec frame(Scene.t(), t()) :: {iodata(), t()}
@@ -114,9 +128,21 @@ defmodule Console.Terminal do
     "#{word} #{Format.decimals(mean, 2)}/#{Format.decimals(max, 2)} m"
   end
 
+  # The last row says how it goes on.
   defp body(_scene, %{overlay: lines} = view, rows) when is_list(lines) do
-    lines = ["" | Enum.flat_map(lines, &Format.rows(&1, max(view.columns - 3, 20)))]
-    {Enum.take(Enum.map(lines, &[{"  " <> &1, :plain}]) ++ List.duplicate([], rows), rows), view}
+    lines = Enum.flat_map(lines, &Format.rows(&1, max(view.columns - 3, 20)))
+    {shown, left} = lines |> Enum.drop(view.turned) |> Enum.split(max(rows - 2, 1))
+
+    foot =
+      if left == [],
+        do: "(press Enter to return to the map)",
+        else: "(#{Format.count(length(left), "line")} more: press Enter)"
+
+    rows =
+      Enum.map(shown, &[{"  " <> &1, :plain}]) ++
+        List.duplicate([], max(rows - 1 - length(shown), 0)) ++ [[{"  " <> foot, :dim}]]
+
+    {rows, %{view | page: {length(shown), length(left)}}}
   end
 
   defp body(scene, view, rows) do

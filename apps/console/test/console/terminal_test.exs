@@ -67,6 +67,25 @@ defmodule Console.TerminalTest do
     assert Console.Page.State.scene(scene, nil, nil, 0) =~ told
   end
 
+  test "lines that do not fit are shown page by page, and nothing is cut without a word" do
+    scene = Runs.scene("", 12)
+    help = Console.Prompt.help()
+    view = Terminal.show(%Terminal{columns: 80, rows: 24}, help)
+
+    {pages, view} =
+      Enum.map_reduce(1..3, view, fn _page, view ->
+        {rows, view} = Terminal.rows(scene, view)
+        {Enum.map(rows, &Style.plain/1), Terminal.turn(view)}
+      end)
+
+    [first, second, third] = pages
+    assert Enum.any?(first, &(&1 =~ ~r/\(\d+ lines more: press Enter\)/))
+    shown = Enum.map_join(pages, "\n", &Enum.join(&1, "\n"))
+    for line <- help, do: assert(shown =~ line and String.length(line) <= 77)
+    assert Enum.any?(second ++ third, &(&1 =~ "(press Enter to return to the map)"))
+    assert view.overlay == nil
+  end
+
   test "dead robots are shown where they lie" do
     text = "--kill mag2@3" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
     assert text =~ "✗"

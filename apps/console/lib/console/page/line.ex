@@ -73,6 +73,9 @@ defmodule Console.Page.Line do
   defp view(:quit, _text, _given_us, _source),
     do: {:error, "the page is closed in the browser, its program in the terminal"}
 
+  defp view(:page, _text, _given_us, _source),
+    do: {:error, "this is the page; its address is that of your browser"}
+
   defp view({hand, _whom}, _text, _given_us, _source) when hand in [:drive, :gamepad],
     do: {:error, "#{hand} is for the terminal; here the keys drive by the button Drive by keys"}
 

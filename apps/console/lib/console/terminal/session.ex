@@ -29,7 +29,8 @@ defmodule Console.Terminal.Session do
                 ended: nil,
                 redraw?: false,
                 keys: nil,
-                gamepad: nil
+                gamepad: nil,
+                page: ["there is no page: --page off"]
               ]
 
   @doc "Runs until the time is up or somebody quits; returns the exit status."
@@ -85,8 +86,15 @@ defmodule Console.Terminal.Session do
     lines = if(Options.real_time?(options), do: module.lines(live), else: [])
     begin(session, options, lines ++ told)
 
+    session = if told == [], do: session, else: %{session | page: told}
+
     session =
-      if mode == :screen, do: Enum.reduce(told, session, &answer(&2, &1, :dim)), else: session
+      cond do
+        mode != :screen -> session
+        # Else nobody would see the processes.
+        options.nodes -> show(session, lines ++ told)
+        true -> Enum.reduce(told, session, &answer(&2, &1, :dim))
+      end
 
     send(self(), :draw)
     session = loop(session)
@@ -239,8 +247,14 @@ defmodule Console.Terminal.Session do
     end
   end
 
-  defp entered(session, line, given_us),
-    do: obey(%{session | view: %{session.view | overlay: nil}}, line, given_us)
+  # Enter alone turns the page.
+  defp entered(%{view: %{overlay: [_ | _]} = view} = session, line, given_us) do
+    if String.trim(line) == "",
+      do: %{session | view: Terminal.turn(view)},
+      else: obey(%{session | view: %{view | overlay: nil}}, line, given_us)
+  end
+
+  defp entered(session, line, given_us), do: obey(session, line, given_us)
 
   defp drive(session, keys),
     do: put_in(%{session | keys: keys}.view.driving, keys && Teleop.Keys.hint(keys))
@@ -327,7 +341,10 @@ defmodule Console.Terminal.Session do
         end
 
       {:ok, :nodes} ->
-        show(session, session.module.lines(session.live))
+        show(session, session.module.lines(session.live) ++ session.page)
+
+      {:ok, :page} ->
+        Enum.reduce(session.page, session, &answer(&2, &1, :good))
 
       {:ok, :status} ->
         show(session, Format.everybody(session.module.scene(session.live)))
@@ -361,8 +378,7 @@ defmodule Console.Terminal.Session do
     session
   end
 
-  defp show(session, lines),
-    do: put_in(session.view.overlay, lines ++ ["", "(press Enter to return to the map)"])
+  defp show(session, lines), do: %{session | view: Terminal.show(session.view, lines)}
 
   # Printed after the terminal is restored.
   defp finish({:refused, line}, _options) do
