@@ -162,7 +162,7 @@ defmodule Console.PageMeshTest do
       # A second person sees it, too, and why all stand.
       Browser.await(
         browser,
-        "return /EMERGENCY STOP for \\d+ s, called by .+: 2 of 2 robots held;/.test(document.getElementById('held').innerText)"
+        "return /EMERGENCY STOP for \\d+ s, called (by .+|here): 2 of 2 robots held;/.test(document.getElementById('held').innerText)"
       )
 
       assert Swarm.status(:min41).estop

@@ -212,6 +212,6 @@ defmodule Console.PromptTest do
     assert Prompt.completions(["start", "patrol"], [:mag1]) == []
 
     assert Enum.join(Prompt.help(), "\n") =~
-             "starts another mission: landmark, patrol, flock, explore"
+             ~r"starts another mission:\n +landmark, patrol, flock, explore"
   end
 end

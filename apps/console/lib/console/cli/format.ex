@@ -54,11 +54,8 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :given_up, robot: robot, x: x, y: y, blocked_by: why}),
     do: "#{robot} gives up its way to #{x},#{y}: blocked by #{why}"
 
-  def meaning(%{stage: :estop_holds, by: []}),
-    do: "the emergency stop holds robots, until a reset"
-
   def meaning(%{stage: :estop_holds, by: by}),
-    do: "the emergency stop of #{Enum.join(by, ", ")} holds robots, until a reset"
+    do: "emergency stop#{called(by)}: held until a reset"
 
   def meaning(%{stage: :estop_over}), do: "no robot is held any more; they stand until a start"
 
@@ -104,10 +101,14 @@ defmodule Console.Cli.Format do
   def estop(%{estop: nil}), do: nil
 
   def estop(%{estop: stop} = scene) do
-    by = if stop.by == [], do: "", else: ", called by #{Enum.join(stop.by, ", ")}"
     held = "#{length(stop.held)} of #{count(stop.of, "robot")} held#{free(scene.robots, stop)}"
-    "EMERGENCY STOP for #{duration(scene.at_ms - stop.since_ms)}#{by}: #{held}; reset frees them"
+    since = duration(scene.at_ms - stop.since_ms)
+    "EMERGENCY STOP for #{since}#{called(stop.by)}: #{held}; reset frees them"
   end
+
+  defp called([]), do: ""
+  defp called(["this program"]), do: ", called here"
+  defp called(by), do: ", called by #{Enum.join(by, ", ")}"
 
   # Those that still drive are the news.
   defp free(robots, stop) do
