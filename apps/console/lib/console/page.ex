@@ -18,7 +18,7 @@ defmodule Console.Page do
   """
   use Supervisor
   alias Console.Page
-  alias Console.Page.{Door, Feed}
+  alias Console.Page.{Door, Feed, Request}
 
   @typedoc """
   `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
@@ -98,7 +98,7 @@ defmodule Console.Page do
     page =
       options
       |> Map.take([:token, :origin, :port])
-      |> Map.merge(%{robots: robots, page: self(), session: session})
+      |> Map.merge(%{answer: Request, robots: robots, page: self(), session: session})
 
     door = {Door, options |> Map.take([:address, :port]) |> Map.put(:page, page)}
     feed = {Feed, Map.take(options, [:module, :live])}

@@ -8,7 +8,7 @@ defmodule Console.Page.Door do
   @compile {:no_warn_undefined, [:mochiweb_clock, :mochiweb_http]}
   require Logger
   alias Console.Page
-  alias Console.Page.{Connections, Guesses, Request}
+  alias Console.Page.{Connections, Guesses}
 
   @look_ms 250
   @acceptors 8
@@ -31,7 +31,7 @@ defmodule Console.Page.Door do
     send_timeout_close: true
   ]
 
-  @doc "Listens at `address` and `port`; `page` is handed to each request."
+  @doc "Listens at `address` and `port`; `page` is handed to each request, which its module `answer` answers."
   @spec start_link(%{address: :inet.ip_address(), port: :inet.port_number(), page: map()}) ::
           GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, options)
@@ -153,6 +153,6 @@ defmodule Console.Page.Door do
       end
 
     :ok = GenServer.call(door, {:accepted, address}, :infinity)
-    :mochiweb_http.loop(socket, [], {Request, :answer, [page]})
+    :mochiweb_http.loop(socket, [], {page.answer, :answer, [page]})
   end
 end
