@@ -24,9 +24,10 @@ defmodule Console.Live do
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
   @typedoc """
-  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed.
+  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed; those
+  that are not in lockstep take orders to single robots.
   """
-  @type offer :: :kill | :landmark | :arm
+  @type offer :: :kill | :landmark | :arm | :orders
 
   @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
   @callback pace(live :: term()) :: String.t() | nil

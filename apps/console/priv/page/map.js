@@ -203,7 +203,8 @@ export class FloorView {
 
   trail(c, r, ink) {
     const path = this.paths.get(r.id);
-    if (path.length < 2) return;
+    // After a new map the last scene is still that of the former one.
+    if (!path || path.length < 2) return;
     c.beginPath();
     for (const [x, y, jumped] of path) c[jumped ? "moveTo" : "lineTo"](...this.toPixel(x, y));
     c.strokeStyle = ink;

@@ -13,7 +13,7 @@ const held = new HeldKeys();
 // Reachable for tests and the curious.
 const floor = window.floor = new FloorView(by("map"), {
   choose,
-  send: (x, y) => (chosen ? say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`) : answer({ ok: false, text: "choose a robot first" })),
+  send: (x, y) => (by("drive").hidden ? answer({ ok: false, text: "in lockstep robots take no places; start the demo without --speed" }) : chosen ? say(`goto ${chosen} ${x.toFixed(2)},${y.toFixed(2)}`) : answer({ ok: false, text: "choose a robot first" })),
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
 });
 
@@ -181,11 +181,17 @@ function choose(id) {
   camera(false);
   chosen = chosen === id ? null : id;
   floor.chosen = chosen;
-  floor.about = null;
-  by("about").replaceChildren();
+  nothing();
   by("events").replaceChildren();
   say(`look ${chosen ?? ""}`);
   if (scene) show(scene);
+}
+
+// Of one that is newly chosen, or has gone, nothing is known that is of now.
+function nothing() {
+  floor.about = null;
+  by("about").replaceChildren();
+  by("camera").hidden = by("sonar").hidden = true;
 }
 
 function one() {
@@ -193,6 +199,8 @@ function one() {
   by("one").hidden = !robot;
   if (!robot) return;
   by("chosen").textContent = robot.id;
+  by("acts").className = robot.alive ? "" : robot.state === "not_heard" ? "away" : "gone";
+  if (!robot.alive) nothing();
   const where = robot.x === null ? "pose unknown"
     : `at ${robot.x.toFixed(2)}, ${robot.y.toFixed(2)}, ${Math.round((robot.a * 180) / Math.PI)}°`;
   by("doing").textContent = (robot.alive ? `${words(robot.state)}, ${where}` : `${away(robot)}, last ${where}`)
@@ -215,7 +223,7 @@ const decimals = (number) => (Math.round(number * 100) / 100 + 0).toFixed(2);
 
 // Why it does what it does: who wished, the chosen one first, what limits it, its way, its devices, and what it did.
 function about(told) {
-  if (told.id !== chosen) return;
+  if (told.id !== chosen || !scene?.robots.find((r) => r.id === chosen)?.alive) return;
   floor.about = told;
   const rows = [
     ["does", told.by && words(told.by)],

@@ -326,7 +326,7 @@ defmodule Console.Terminal.Session do
         {:quit, session}
 
       {:ok, :help} ->
-        show(session, Prompt.help())
+        show(session, Prompt.help(offers(session)))
 
       {:ok, {:drive, robot}} when session.mode == :screen ->
         drive(session, Teleop.Keys.new(robot))
@@ -360,6 +360,10 @@ defmodule Console.Terminal.Session do
       {:error, error} ->
         answer(session, error, :bad)
     end
+  end
+
+  defp offers(%{module: module, live: live}) do
+    if function_exported?(module, :offers, 1), do: module.offers(live), else: []
   end
 
   defp answered(session, line, {:ok, text}), do: answer(session, "#{line}: #{text}", :good)
