@@ -50,6 +50,10 @@ defmodule Robot.Names do
   def register(robot, role, value) when is_atom(robot),
     do: GenServer.call(__MODULE__, {:register, {robot, role}, self(), value}, :infinity)
 
+  @doc "The roles that a robot of this node has now."
+  @spec roles(robot :: atom()) :: [role :: term()]
+  def roles(robot), do: select([{{{robot, :"$1"}, :_, :_}, [], [:"$1"]}])
+
   @doc "The processes in this role of all robots of this node."
   @spec all(role :: term()) :: [pid()]
   def all(role), do: select([{{{:_, role}, :"$1", :_}, [], [:"$1"]}])

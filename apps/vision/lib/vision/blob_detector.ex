@@ -27,7 +27,7 @@ defmodule Vision.BlobDetector do
   """
   use Hal.HardenedServer
   alias Hal.{Frame, HardenedServer, Ptz}
-  alias Vision.{Colours, Detections}
+  alias Vision.{Colours, Detections, Filter}
 
   defguardp is_aim(reading)
             when is_map(reading) and is_number(reading.pan) and is_number(reading.tilt) and
@@ -86,6 +86,8 @@ defmodule Vision.BlobDetector do
     state = state |> count(:dropped, dropped) |> newest_aim()
 
     with {:ok, frame} <- direct(frame, state), {:ok, blobs} <- read(frame, state) do
+      # A backend may be anybody's.
+      blobs = Filter.real(blobs, {frame.width, frame.height})
       {m, f, a} = state.sink
       apply(m, f, a ++ [{:detections, Detections.new(frame, blobs)}])
       {:noreply, count(state, :read, 1)}

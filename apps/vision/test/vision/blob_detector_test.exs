@@ -49,6 +49,23 @@ defmodule Vision.BlobDetectorTest do
     end
   end
 
+  defmodule Phantoms do
+    @moduledoc "A backend that also finds what is larger than the picture."
+    @behaviour Vision.Backend
+    @impl Vision.Backend
+    def reads?(_format), do: true
+    @impl Vision.Backend
+    def regions(_frame, _colours),
+      do: {:ok, [{0, 1, 0, 0, 0, 0, 0, 0}, {0, 113_240, 0, 0, 0, 0, 22_647, 4}]}
+  end
+
+  test "what cannot be in a picture is not passed on, whatever finds it", %{colours: colours} do
+    options = [colours: colours, backend: Phantoms, sink: {Kernel, :send, [self()]}]
+    detector = start_supervised!({BlobDetector, options}, id: :phantoms)
+    :ok = BlobDetector.frame(detector, frame(7))
+    assert_receive {:detections, %Detections{at_ms: 7, blobs: [%{area: 1}]}}
+  end
+
   test "wrong frames are counted and give nothing", %{detector: detector} do
     BlobDetector.frame(detector, %{frame(1) | bytes: <<1>>})
     assert %{wrong: 1, last_error: {:bytes, 1, :expected, 4}} = BlobDetector.status(detector)

@@ -10,14 +10,14 @@ defmodule Swarm.Discovery.RobotInfo do
   | `battery` | volts, `nil` if it is not measured |
   | `calibrated` | `true` unless `say/2` says otherwise |
   | `mission`, `state` | what it is doing, such as `:landmark` and `:follow`, or `nil` and `:idle` |
-  | `services` | what it has: `:drive`, `:camera`, `:ptz`, and those from `say/2` |
+  | `services` | what it has: `:drive`, `:camera`, `:ptz`, the responders that run on it (roles `{:service, name}` of `Robot.Names`), and those from `say/2` |
   | `node`, `age_ms` | its node; the age of the row |
 
   `say/2`, on the robot's node, adds what only others know about a robot.
 
   Names travel as text, and stay text if this node has no such atom.
   """
-  alias Robot.Board
+  alias Robot.{Board, Names}
   alias Robot.Safety.LivenessMonitor
   alias Swarm.{Blackboard, Status}
   alias Swarm.Wire
@@ -108,7 +108,8 @@ defmodule Swarm.Discovery.RobotInfo do
       calibrated: Keyword.get(said, :calibrated, true),
       mission: mission,
       state: state,
-      services: Enum.uniq(devices(config) ++ Keyword.get(said, :services, []))
+      services:
+        Enum.uniq(devices(config) ++ offered(config.id) ++ Keyword.get(said, :services, []))
     }
   end
 
@@ -126,6 +127,13 @@ defmodule Swarm.Discovery.RobotInfo do
 
   defp devices(config) do
     for device <- [:drive, :camera, :ptz], Map.get(config, device), do: Atom.to_string(device)
+  end
+
+  defp offered(robot) do
+    names =
+      for {:service, name} when is_atom(name) <- Names.roles(robot), do: Atom.to_string(name)
+
+    Enum.sort(names)
   end
 
   defp said(robot) do

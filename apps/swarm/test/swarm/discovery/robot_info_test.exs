@@ -50,6 +50,15 @@ defmodule Swarm.Discovery.RobotInfoTest do
     assert RobotInfo.say(:ab1, calibrated: false) == :ok
     eventually(fn -> Swarm.find(service: :gripper, calibrated: false) == [:ab1] end)
 
+    # A responder is found while it runs.
+    responder =
+      start_supervised!({Agent, fn -> Names.register(:ab1, {:service, :power}, nil) end})
+
+    eventually(fn -> Swarm.find(service: :power) == [:ab1] end)
+    stop_supervised!(Agent)
+    refute Process.alive?(responder)
+    eventually(fn -> Swarm.find(service: :power) == [] end)
+
     # It is written on each change, not only once a second.
     :ok = Swarm.start(robots: [:ab2])
     eventually(fn -> Swarm.find(robot: :ab2, mission: :stand_mission) == [:ab2] end, 900)
