@@ -27,7 +27,8 @@ defmodule Hal.Event do
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: the reasons to limit the speed have changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
-  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board |
+  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board; it is tried again |
+  | `[:robot, :estop_file, :healed]` | | `robot`, `file`: it does now |
   | `[:robot, :departure_file, :failed]` | | `robot`, `file`: it cannot be noted that the robot has left its start pose; it is tried again each second |
   | `[:robot, :recorder, :failed]` | `at_ms` | `robots`, `robot` (the first of them), `line`: nothing can be recorded; a folder is tried again |
   | `[:robot, :recorder, :healed]` | `at_ms` | `robots`, `robot`, `file`: it is recorded again |

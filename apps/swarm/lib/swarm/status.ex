@@ -18,7 +18,8 @@ defmodule Swarm.Status do
   says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
   that is slow because it has no sonar is `BLIND`, and one that is because another may be near, which it cannot tell, is
   `CAUTIOUS` (`Robot.Behaviour.Avoid.Caution`). A robot that stands without being told to says
-  `FAULT`, and why (`fault`).
+  `FAULT`, and why (`fault`). One whose e-stop file does not say what the stop does says `E-STOP NOT ON ITS DISK`, or
+  `RESET NOT ON ITS DISK`, with the file and why (`estop_file`); it is tried again until it does.
 
   If a robot's gate, behaviour or mission hangs, it says so, also for a minute after the restart
   that follows (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how
@@ -68,6 +69,7 @@ defmodule Swarm.Status do
                 speed: 0.0,
                 limits: [],
                 estop: false,
+                estop_file: nil,
                 arming: nil,
                 why: nil,
                 hung: nil,
@@ -103,6 +105,7 @@ defmodule Swarm.Status do
           speed: float() | nil,
           limits: [atom() | String.t()],
           estop: boolean(),
+          estop_file: String.t() | nil,
           arming: Hal.Device.Arming.state() | nil,
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
@@ -148,6 +151,7 @@ defmodule Swarm.Status do
       limits:
         (entries |> value(:doing) |> field(:limits) || []) ++ (field(driving, :limits) || []),
       estop: Board.latched?(board),
+      estop_file: unsaved(Board.unsaved(board)),
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
@@ -174,6 +178,9 @@ defmodule Swarm.Status do
       age_ms: age(entries)
     }
   end
+
+  defp unsaved(nil), do: nil
+  defp unsaved({file, reason}), do: "#{:file.format_error(reason)}: #{file}"
 
   defp words(config, device, reason),
     do: config |> Map.fetch!(device) |> Words.offline(reason)
@@ -250,6 +257,7 @@ defmodule Swarm.Status do
 
       [
         status.estop && "E-STOP",
+        unsaved(status),
         Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
         limited?(status, "blind") && "BLIND (no sonar; slow)",
@@ -277,6 +285,10 @@ defmodule Swarm.Status do
         _not_told -> "#{device} offline"
       end
     end
+
+    defp unsaved(%{estop_file: nil}), do: nil
+    defp unsaved(%{estop: true} = status), do: "E-STOP NOT ON ITS DISK (#{status.estop_file})"
+    defp unsaved(status), do: "RESET NOT ON ITS DISK (#{status.estop_file})"
 
     defp hung(nil), do: nil
     defp hung({:silent, where, _ago_ms}), do: "HANGS in #{where}"

@@ -20,6 +20,7 @@ defmodule Robot.Devices.Log do
     [:robot, :fault],
     [:robot, :stage],
     [:robot, :estop_file, :error],
+    [:robot, :estop_file, :healed],
     [:robot, :departure_file, :failed],
     [:robot, :executive, :away],
     [:vision, :saver, :failed],
@@ -105,7 +106,7 @@ defmodule Robot.Devices.Log do
   def line(:error, %{robot: robot, file: file, reason: reason}) do
     {:error,
      "#{robot}: the e-stop file #{file} is not as the stop is (#{:file.format_error(reason)}): the stop holds as " <>
-       "it was told, but would not outlive a restart of the machine so"}
+       "it was told, but would not outlive a restart of the machine so; the file is tried again"}
   end
 
   def line(:dropped, %{name: name, count: count}) do
@@ -132,6 +133,9 @@ defmodule Robot.Devices.Log do
 
   def line(:healed, %{robots: [robot | _], file: file}),
     do: {:info, "#{robot}: recorded again, in #{file}"}
+
+  def line(:healed, %{robot: robot, file: file}),
+    do: {:info, "#{robot}: the e-stop file #{file} is as the stop is"}
 
   def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
 
