@@ -26,6 +26,7 @@ defmodule Robot.Board do
   | `{:hung, part}` | `:watch` | where `:gate`, `:executive` or `:pilot` hangs (4) |
   | `:departed` | `:executive` | the odometry frame in which it has left its start pose (`Robot.Departure`) |
   | `:pose` | `:executive` | the estimate in the `map` frame |
+  | `{:crashed, part}` | `:pilot`, `:executive` | why its mission, or a behaviour, crashed last (`Robot.Control.Crash`) |
   | `:asking` | `:pilot` | while a callback of the mission runs (5) |
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | the state of the mission and its claim (6) |
@@ -55,9 +56,9 @@ defmodule Robot.Board do
   with the board, on purpose.
 
   The latch is a table of its own, written by the gate only, so that a gate that restarts is still
-  latched. With a file (real robots) it also survives a restart of the board and of the machine: the
-  file exists while the latch is set. Who must know that it does asks by `saved/2`. A file that cannot be written is
-  tried again, after 0.1 s to 5 s, until it says what the latch does; until then `unsaved/1` says why.
+  latched. With a file (real robots) it also survives a restart of the board and of the machine: the file exists while
+  the latch is set. Who must know that it does asks by `saved/2`. One that cannot be written is tried again, after 0.1 s
+  to 5 s; until then `unsaved/1` says why.
   """
   use Hal.HardenedServer
   alias Hal.HardenedServer
@@ -244,10 +245,7 @@ defmodule Robot.Board do
     cast(board, :latch)
   end
 
-  @doc """
-  Applies `then`, `apply(m, f, a ++ [result])`: with `:ok` when the file of the latch says what the latch does or there is
-  none, or with `{:error, {path, reason}}` of the attempt that is made now.
-  """
+  @doc "Applies `then` to `:ok`, if the file of the latch says what that does, or to `{:error, fault}` (`unsaved/1`)."
   @spec saved(t(), then :: Robot.Config.call()) :: :ok
   def saved(%__MODULE__{} = board, {_m, _f, _a} = then), do: cast(board, {:saved, then})
 
@@ -346,7 +344,7 @@ defmodule Robot.Board do
   end
 
   defp writer({:peer, _id}), do: :comms
-  defp writer({:health, device}), do: device
   defp writer({:hung, _part}), do: :watch
+  defp writer({kind, part}) when kind in [:health, :crashed], do: part
   defp writer(key), do: Map.get(@writers, key)
 end

@@ -74,6 +74,7 @@ defmodule Robot.SupervisorTest do
     [gate, drive] = parts(id, [:gate, :drive])
     before = parts(id, @above)
     listen(id)
+    listen(id, [:robot, :stage])
 
     log =
       capture_log(fn ->
@@ -83,6 +84,14 @@ defmodule Robot.SupervisorTest do
       end)
 
     assert log =~ "a bad behaviour"
+    assert_receive {[:robot, :stage], %{stage: :crashed, crash: crash}}
+    assert crash =~ ~r"^\(RuntimeError\) a bad behaviour, test/support/acts.ex:\d+$"
+    board = Board.find!(id)
+    assert {:ok, ^crash, _} = Board.fetch(board, {:crashed, :executive}, :infinity)
+    # It is told until another one begins.
+    assert Executive.goal(id, :roll, {Acts.Roll, twist: @zero}) == :ok
+    assert Board.fetch(board, {:crashed, :executive}, :infinity) == :error
+    Executive.goal(id, :roll, nil)
     forget_drives()
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero
     stands(150)
@@ -206,11 +215,17 @@ defmodule Robot.SupervisorTest do
     rolls()
     executive = Names.whereis(id, :executive)
     listen(id)
+    listen(id, [:robot, :stage])
 
     capture_log(fn ->
       catch_exit(Pilot.command(id, :raise))
       assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
     end)
+
+    assert_receive {[:robot, :stage], %{stage: :crashed, crash: crash}}
+    assert crash =~ ~r"^\(RuntimeError\) the mission was told to, test/support/acts.ex:\d+$"
+    board = Board.find!(id)
+    assert {:ok, ^crash, _} = Board.fetch(board, {:crashed, :pilot}, :infinity)
 
     assert Names.whereis(id, :executive) == executive
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero

@@ -25,6 +25,9 @@ defmodule Swarm.Status do
   that follows (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how
   long ago, ms).
 
+  One whose mission or behaviour crashed stands idle, and says `CRASHED`, what failed and where, until its next order
+  (`crashed`; `Robot.Control.Crash`).
+
   A robot that does not get to its place is `BLOCKED by …`, as its mission says (`blocked_by`); what that says in words of
   its own (`says`) stands there as it is.
 
@@ -73,6 +76,7 @@ defmodule Swarm.Status do
                 arming: nil,
                 why: nil,
                 hung: nil,
+                crashed: nil,
                 leader: nil,
                 epoch: nil,
                 blocked_by: nil,
@@ -109,6 +113,7 @@ defmodule Swarm.Status do
           arming: Hal.Device.Arming.state() | nil,
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
+          crashed: String.t() | nil,
           leader: atom() | String.t() | nil,
           epoch: non_neg_integer() | nil,
           blocked_by: String.t() | nil,
@@ -155,6 +160,7 @@ defmodule Swarm.Status do
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
+      crashed: crashed(entries),
       leader: mission |> field(:claim) |> field(:leader),
       epoch: mission |> field(:claim) |> field(:epoch),
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
@@ -212,6 +218,12 @@ defmodule Swarm.Status do
     Enum.min_by(hung, fn {what, _where, ago_ms} -> {what == :hung, ago_ms} end, fn -> nil end)
   end
 
+  # Of both, the later one.
+  defp crashed(entries) do
+    crashed = for {{:crashed, _part}, {line, age_ms}} <- entries, do: {age_ms, line}
+    with {_age_ms, line} <- Enum.min(crashed, fn -> nil end), do: line
+  end
+
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)
 
@@ -263,6 +275,7 @@ defmodule Swarm.Status do
         limited?(status, "blind") && "BLIND (no sonar; slow)",
         limited?(status, "caution") && "CAUTIOUS (another robot may be near; slow)",
         hung(status.hung),
+        status.crashed && "CRASHED #{status.crashed}",
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         is_binary(status.says) && status.says,
         status.replaced,

@@ -161,6 +161,9 @@ defmodule Robot.Devices.Log do
   def line(:stage, %{stage: :replacement, what: what, robot: robot, says: says}),
     do: {if(what == :back, do: :warning, else: :info), "#{robot} #{says}"}
 
+  def line(:stage, %{stage: :crashed, robot: robot, crash: crash}),
+    do: {:error, "#{robot} crashed, and is idle: #{crash}"}
+
   def line(:stage, _told_by_others), do: nil
 
   defp process({robot, role}), do: "#{robot}: #{role}"

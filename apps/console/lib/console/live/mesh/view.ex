@@ -96,6 +96,7 @@ defmodule Console.Live.Mesh.View do
        "its e-stop file is as the stop is"},
       {:arming, Status.arming(status), "its wheels may turn"},
       {:fault, status.fault && "fault: #{status.fault}", "the fault is gone"},
+      {:crashed, status.crashed && "crashed: #{status.crashed}", "begins anew after its crash"},
       {:blocked, status.blocked_by && "blocked by #{status.blocked_by}", "its way is free"},
       {:offline, if(offline != [], do: "offline: #{Enum.join(Enum.sort(offline), ", ")}"),
        "all devices are online"},
