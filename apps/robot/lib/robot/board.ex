@@ -10,6 +10,7 @@ defmodule Robot.Board do
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
   | `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
+  | `:disarmed` | `:drive` | whether a person has disarmed it |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:detections` | `:blob_detector` | `Vision.Detections`, at the time of its picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, at the time it began |
@@ -50,15 +51,13 @@ defmodule Robot.Board do
 
   After its end nothing is found on it, and what is written to it has no effect.
 
-  This process owns the tables, so that they survive a crash of their writers, and writes what must
-  survive more: the **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is
-  slow, or hangs, delays neither the gate's steps nor the executive's ticks. All the rest is lost
-  with the board, on purpose.
+  This process owns the tables, so that they survive a crash of their writers, and writes what must survive more: the
+  **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is slow, or hangs, delays neither the gate's
+  steps nor the executive's ticks. All the rest is lost with the board, on purpose.
 
-  The latch is a table of its own, written by the gate only, so that a gate that restarts is still
-  latched. With a file (real robots) it also survives a restart of the board and of the machine: the file exists while
-  the latch is set. Who must know that it does asks by `saved/2`. One that cannot be written is tried again, after 0.1 s
-  to 5 s; until then `unsaved/1` says why.
+  The latch is a table of its own, written by the gate only, so that a gate that restarts is still latched. With a file
+  (real robots) it also survives a restart of the board and of the machine: the file exists while the latch is set. Who
+  must know asks by `saved/2`. A write that failed is tried again; until then `unsaved/1` says why.
   """
   use Hal.HardenedServer
   alias Hal.HardenedServer
@@ -104,6 +103,7 @@ defmodule Robot.Board do
     joystick: :drive,
     home: :drive,
     arming: :drive,
+    disarmed: :drive,
     ptz: :ptz,
     detections: :blob_detector,
     driving: :gate,

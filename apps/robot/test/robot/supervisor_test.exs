@@ -381,6 +381,46 @@ defmodule Robot.SupervisorTest do
     assert_receive {[:hal, :device, :online], %{again?: true}}
   end
 
+  test "what a person has disarmed stays so when its drive crashes, or is killed, with arm: :auto, too" do
+    id = robot(:fall20, arm: :auto)
+    drive = fn -> Names.whereis(id, :drive) end
+    assert Hal.Device.arming(drive.()).state == :armed
+    :ok = Hal.Device.disarm(drive.())
+
+    for end_it <- [fn -> kill(id, :drive) end, fn -> crash(id) end] do
+      before = drive.()
+      end_it.()
+      another_online(id, before)
+      assert %{state: :disarmed, by_person?: true} = Hal.Device.arming(drive.())
+    end
+
+    assert Hal.Device.arm(drive.()) == :ok
+    before = drive.()
+    kill(id, :drive)
+    another_online(id, before)
+    assert Hal.Device.arming(drive.()).state == :armed
+  end
+
+  defp another_online(id, before, left \\ 2_000) do
+    if left > 0 and Names.whereis(id, :drive) in [nil, before] do
+      receive(do: (:never -> :ok), after: (5 -> another_online(id, before, left - 1)))
+    else
+      # It says that it is offline before it takes anything.
+      _state = :sys.get_state(Names.whereis(id, :drive))
+      online(id)
+    end
+  end
+
+  defp crash(id) do
+    drive = Names.whereis(id, :drive)
+    monitor = Process.monitor(drive)
+
+    capture_log(fn ->
+      send(drive, :raise)
+      assert_receive {:DOWN, ^monitor, _, _, _}
+    end)
+  end
+
   test "a drive that crashes over every message does not take the robot down" do
     id = rolling(:fall10)
     parts = parts(id, [:gate | @above])
