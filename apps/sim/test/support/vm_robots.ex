@@ -88,6 +88,16 @@ defmodule Sim.VmRobots do
 
   defp roll(_robots, _id, _arming, _under_way), do: :ok
 
+  @doc "The process id of the port program of a robot's drive; `nil` while its line is closed."
+  def port_program(%{vm: vm}, id), do: Vm.call(vm, __MODULE__, :port_program, [id])
+
+  @doc false
+  def port_program(id) do
+    drive = Robot.Names.whereis(id, :drive)
+    port = Enum.find(Port.list(), &(Port.info(&1, :connected) == {:connected, drive}))
+    with {:os_pid, pid} <- port && Port.info(port, :os_pid), do: "#{pid}"
+  end
+
   @doc "Sends a signal to the VM, and waits until it has come."
   def signal(%{vm: vm}, "STOP") do
     Vm.signal(vm, "STOP")

@@ -22,6 +22,10 @@ defmodule Sim.Hardware.FreezeTest do
     # The last words were said long ago; what was written before them has come.
     since_ms = now_ms() - 50
     signal(robots, "CONT")
+    stand(robots, since_ms, ms)
+  end
+
+  defp stand(robots, since_ms, ms) do
     moved = fn -> Enum.find(@ids, &(moves(robots, &1, since_ms) != [])) end
     drove = watch(1_500, moved)
     assert {ms, drove} == {ms, nil}
@@ -42,6 +46,25 @@ defmodule Sim.Hardware.FreezeTest do
     tmp_dir: folder
   } do
     stand_after_freezes(folder, [300, 1_950, 2_500])
+  end
+
+  test "a VM that is frozen together with its port programs, and thaws before them, drives no more either",
+       %{
+         tmp_dir: folder
+       } do
+    robots = start(@robots, folder)
+    for id <- @ids, do: roll(robots, id)
+    programs = for id <- @ids, do: port_program(robots, id)
+    # Whatever becomes of the test, nothing is left behind frozen.
+    on_exit(fn -> Vm.signal(programs, "CONT") end)
+    signal(robots, "STOP")
+    Vm.signal(programs, "STOP")
+    pass(1_000)
+    since_ms = now_ms() - 50
+    signal(robots, "CONT")
+    pass(150)
+    Vm.signal(programs, "CONT")
+    stand(robots, since_ms, 1_000)
   end
 
   @tag long: true, realtime: :long, timeout: 600_000
