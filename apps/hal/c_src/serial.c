@@ -494,7 +494,7 @@ static int64_t number_64(const uint8_t *bytes)
     return number > INT64_MAX ? INT64_MAX : (int64_t)number;
 }
 
-/* Takes a sign of life given at `at`; returns its age. A time in the future counts as now. */
+/* Takes a sign of life given at `at`; returns since when it counts. A time in the future counts as now. */
 static int64_t alive(int64_t at)
 {
     int64_t now = now_ms();
@@ -505,7 +505,7 @@ static int64_t alive(int64_t at)
         hush();
     if (at > s.life_ms)
         s.life_ms = at;
-    return now - at;
+    return at;
 }
 
 static void wait_until_sent(int64_t until)
@@ -541,23 +541,23 @@ static void take_packet(const uint8_t *packet, size_t size)
     if (size == 0 || (s.fd < 0 && packet[0] != 'C'))
         return;
     const uint8_t *body = packet + 1;
-    int64_t age = 0;
+    int64_t given_ms = 0;
 
     size--;
     if (packet[0] == 'W' || packet[0] == 'K' || packet[0] == 'L') {
         if (size < 8)
             return;
-        age = alive(number_64(body));
+        given_ms = alive(number_64(body));
         body += 8;
         size -= 8;
     }
     switch (packet[0]) {
     case 'W':
-        if (s.silent || age > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
+        if (s.silent || now_ms() - given_ms > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
             note_taken(size);   /* too late, or more than the VM may send */
         } else {
             if (s.out_have == 0)
-                s.out_ms = now_ms() - age;
+                s.out_ms = given_ms;
             memcpy(s.out + s.out_have, body, size);
             s.out_have += size;
             write_line();
