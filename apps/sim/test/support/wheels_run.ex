@@ -107,7 +107,8 @@ defmodule Sim.WheelsRun do
 
   defp carry_out(robots, id, {:cut, ms}) do
     :ok = Emulator.unplug(robots.bases[id])
-    at_ms = now_ms()
+    # In this millisecond it may have heard something before.
+    at_ms = now_ms() + 1
     pass(ms)
     :ok = Emulator.plug(robots.bases[id])
     {nil, at_ms}

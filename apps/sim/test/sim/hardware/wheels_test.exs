@@ -23,9 +23,16 @@ defmodule Sim.Hardware.WheelsTest do
       for {robots, id, arm, seeds} <- lanes,
           do: Task.async(fn -> {arm, WheelsRun.run(robots, id, seeds, @steps)} end)
 
-    Enum.reduce(Task.await_many(runs, :infinity), %{}, fn {arm, {:ok, counts}}, all ->
-      Map.update(all, arm, counts, &Map.merge(&1, counts, fn _key, a, b -> a + b end))
-    end)
+    results = Task.await_many(runs, :infinity)
+    violations = for {_arm, violation} <- results, elem(violation, 0) != :ok, do: violation
+
+    counts =
+      for {arm, {:ok, counts}} <- results, reduce: %{} do
+        all -> Map.update(all, arm, counts, &Map.merge(&1, counts, fn _key, a, b -> a + b end))
+      end
+
+    assert {violations, counts} == {[], counts}
+    counts
   end
 
   test "a few sequences", %{tmp_dir: folder} do
