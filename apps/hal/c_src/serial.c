@@ -20,20 +20,26 @@
        'K'             'K' was read; sent at most every ANSWER_MS
        'D' bytes       bytes read from the line
        'T' count:32    this many bytes of 'W' were taken by the line, or dropped
-       'E' reason      the line cannot be opened, or is lost; only 'C' follows
+       'E' reason      the line cannot be opened, is lost, or has said its last words in silence
+                       ("last_words"); only 'C' follows
        'C'             closed, or as good as closed; nothing follows
 
-   The last words are written when the input ends, on SIGTERM and SIGHUP, on 'C', and after MS
-   milliseconds without a sign of life: then once, until the next sign of life. They do not wait
-   for earlier bytes that would take longer than PATIENCE_MS to leave. Those are discarded, maybe
-   amid a packet, so the receiver must be able to find the beginning of the last words.
+   The last words are written when the input ends, on SIGTERM and SIGHUP, on 'C', and in silence.
+   They do not wait for earlier bytes that would take longer than PATIENCE_MS to leave. Those are
+   discarded, maybe amid a packet, so the receiver must be able to find the beginning of the last
+   words.
+
+   Silence is MS milliseconds without a sign of life, by any of these: none has come; two that
+   follow each other were given so far apart; this program was stopped (SIGSTOP) for so long, and
+   nothing could be written; the machine was suspended for so long. Whoever was silent does not
+   know what became of the wheels, so the words are the last ones indeed: from the moment that the
+   silence is noticed nothing that the VM sends is written any more, and 'E' says so. The VM closes
+   the line, and opens it anew.
 
    Every sign of life has the time when it was given, `at`, in milliseconds of CLOCK_MONOTONIC,
-   which the VM reads too. This program may be frozen (SIGSTOP) while the VM is not; what the VM
-   sends meanwhile waits in the pipe, and nothing can be written on the line. When the program
-   resumes, packets older than the keep-alive time are not written, and a sign of life counts from
-   when it was given: so no outdated speed is written, but the last words are. The VM notices that
-   'K' is not answered.
+   which the VM reads too. What is older than MS when it could be written is not written, whether it
+   waited in the pipe or for the line. A line without last words is lost by no silence. While this
+   program is stopped the VM notices that 'K' is not answered.
 
    After 'E' and 'C' the program waits for its input to end: if it had ended itself, a write of
    the VM could fail, and the VM would see that failure instead of the packet.
@@ -84,8 +90,11 @@ static struct {
     size_t words_length;
     int64_t life_ms;
     int64_t answer_ms;                  /* when 'K' was answered last */
-    int64_t out_ms;                     /* when the VM sent the newest of `out` */
-    int spoken;                         /* the last words were, since the last sign of life */
+    int64_t out_ms;                     /* when the VM sent the oldest of `out`, or longer ago */
+    int64_t awake_ms;                   /* when this program was known to run */
+    int64_t asleep_ms;                  /* how long the machine has been suspended since it was switched on */
+    int silent;                         /* a silence was noticed: nothing but the last words is written any more */
+    int spoken;                         /* these were, since then */
     uint8_t in[2 + 65535];              /* packets of the VM */
     size_t in_have;
     uint8_t out[SERIAL_OUT_MOST];       /* for the line */
@@ -174,15 +183,20 @@ static int room_up(size_t size)
     return s.up_have + 3 + size <= sizeof s.up;
 }
 
-/* Reports once why the line failed, and closes it. */
-static void fail(const char *reason)
+/* Reports once why the line is of no use any more. */
+static void report(const char *reason)
 {
     if (s.done)
         return;
     s.done = 1;
-    let_go();
     if (room_up(strlen(reason)))
         send_up('E', reason, strlen(reason));
+}
+
+static void fail(const char *reason)
+{
+    let_go();
+    report(reason);
 }
 
 static const char *reason_of(int error)
@@ -241,15 +255,20 @@ static void drop_out(void)
     note_taken(size);
 }
 
-/* Bytes that waited for the line while this program was stopped are old too. */
+/* Bytes that waited too long for the line, or while this program was stopped, are old too. */
 static void drop_stale(void)
 {
-    sigset_t pending;
-
-    if (!continued && (sigpending(&pending) != 0 || !sigismember(&pending, SIGCONT)))
-        return;
     if (s.out_have > 0 && now_ms() - s.out_ms > s.keep_alive_ms)
         drop_out();
+}
+
+/* From here on nothing but the last words is written. */
+static void hush(void)
+{
+    if (s.words_length == 0 || s.silent)
+        return;
+    s.silent = 1;
+    drop_out();
 }
 
 /* Of a pty, bytes that are already in the other end's buffer of 4 kB stay, as with any line. */
@@ -475,18 +494,18 @@ static int64_t number_64(const uint8_t *bytes)
     return number > INT64_MAX ? INT64_MAX : (int64_t)number;
 }
 
-/* Takes a sign of life given at `at`; returns its age. A time in the future counts as now. */
+/* Takes a sign of life given at `at`; returns since when it counts. A time in the future counts as now. */
 static int64_t alive(int64_t at)
 {
     int64_t now = now_ms();
 
     if (at > now)
         at = now;
+    if (at - s.life_ms > s.keep_alive_ms)
+        hush();
     if (at > s.life_ms)
         s.life_ms = at;
-    if (now - at <= s.keep_alive_ms)
-        s.spoken = 0;
-    return now - at;
+    return at;
 }
 
 static void wait_until_sent(int64_t until)
@@ -522,24 +541,25 @@ static void take_packet(const uint8_t *packet, size_t size)
     if (size == 0 || (s.fd < 0 && packet[0] != 'C'))
         return;
     const uint8_t *body = packet + 1;
-    int64_t age = 0;
+    int64_t given_ms = 0;
 
     size--;
     if (packet[0] == 'W' || packet[0] == 'K' || packet[0] == 'L') {
         if (size < 8)
             return;
-        age = alive(number_64(body));
+        given_ms = alive(number_64(body));
         body += 8;
         size -= 8;
     }
     switch (packet[0]) {
     case 'W':
-        if (age > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
+        if (s.silent || now_ms() - given_ms > s.keep_alive_ms || size > sizeof s.out - s.out_have) {
             note_taken(size);   /* too late, or more than the VM may send */
         } else {
+            if (s.out_have == 0)
+                s.out_ms = given_ms;
             memcpy(s.out + s.out_have, body, size);
             s.out_have += size;
-            s.out_ms = now_ms() - age;
             write_line();
         }
         break;
@@ -687,7 +707,7 @@ static int64_t next_ms(void)
     int64_t at = INT64_MAX;
 
     if (s.fd >= 0 && s.words_length > 0 && !s.spoken)
-        at = s.life_ms + s.keep_alive_ms;
+        at = s.silent ? now_ms() : s.life_ms + s.keep_alive_ms;
     if (s.fd >= 0 && s.absent && at > now_ms() + ABSENT_MS)
         at = now_ms() + ABSENT_MS;
     return at;
@@ -698,6 +718,49 @@ static int input_waits(void)
     struct pollfd input = { .fd = STDIN_FILENO, .events = POLLIN };
 
     return poll(&input, 1, 0) > 0;
+}
+
+/* How long the machine has been suspended since the last call: CLOCK_MONOTONIC stands meanwhile. Too
+   little if this program is stopped between the two clocks, and made up for by the next call. */
+static int64_t suspended_ms(void)
+{
+    struct timespec t;
+
+    clock_gettime(CLOCK_BOOTTIME, &t);
+
+    int64_t all = (int64_t)t.tv_sec * 1000 + t.tv_nsec / 1000000 - now_ms();
+    int64_t more = all > s.asleep_ms ? all - s.asleep_ms : 0;
+
+    s.asleep_ms += more;
+    return more;
+}
+
+static int stopped(void)
+{
+    sigset_t pending;
+
+    return continued || (sigpending(&pending) == 0 && sigismember(&pending, SIGCONT));
+}
+
+/* Notices that this program, or the whole machine, has slept so long that the line heard nothing. A
+   program that is merely late, on a busy machine, has not: the signs of life that wait for it count
+   from when they were given. */
+static void wake(void)
+{
+    if (suspended_ms() > s.keep_alive_ms || (stopped() && now_ms() - s.awake_ms > s.keep_alive_ms))
+        hush();
+    continued = 0;
+    s.awake_ms = now_ms();
+}
+
+/* Says the last words once, after all that has come by now, as newer last words may have. */
+static void speak_in_silence(void)
+{
+    if (!s.silent || s.spoken || s.fd < 0)
+        return;
+    s.spoken = 1;
+    speak();
+    report("last_words");
 }
 
 /* Waits for the next events, and handles them. 0 if the VM is gone. */
@@ -711,7 +774,7 @@ static int turn(const sigset_t *while_waiting)
         timeout.tv_nsec = left % 1000 * 1000000;
     }
     /* Data is read only into an empty buffer, so that there is always room for a last packet. */
-    int reading = s.up_have == 0 && s.unread < SERIAL_UNREAD_MOST;
+    int reading = s.up_have == 0 && s.unread < SERIAL_UNREAD_MOST && !s.done;
     short wishes = (short)((reading ? POLLIN : 0) | (s.out_have > 0 ? POLLOUT : 0));
     struct pollfd fds[3] = {
         { .fd = STDIN_FILENO, .events = POLLIN },
@@ -721,8 +784,8 @@ static int turn(const sigset_t *while_waiting)
 
     int found = ppoll(fds, 3, at == INT64_MAX ? NULL : &timeout, while_waiting), interrupted = errno == EINTR;
 
+    wake();
     drop_stale();
-    continued = 0;
     if (found < 0)
         return interrupted;
     if (fds[0].revents && !read_vm())
@@ -745,10 +808,10 @@ static int turn(const sigset_t *while_waiting)
     }
     /* Last, and after another look, so that a sign of life that waits in the input counts: on a
        busy machine this program may be late, not the VM. */
-    if (s.words_length > 0 && !s.spoken && now_ms() >= s.life_ms + s.keep_alive_ms && !input_waits()) {
-        s.spoken = 1;
-        speak();
-    }
+    if (!s.silent && now_ms() >= s.life_ms + s.keep_alive_ms && !input_waits())
+        hush();
+    wake();
+    speak_in_silence();
     return 1;
 }
 
@@ -777,7 +840,8 @@ int serial_run(int argc, char **argv)
         for (int k = 0; k < 8; k++)
             now[k] = (uint8_t)(at >> (56 - 8 * k));
         send_up('O', now, sizeof now);
-        s.life_ms = at;
+        s.life_ms = s.awake_ms = at;
+        suspended_ms();
         s.answer_ms = at - ANSWER_MS;
     }
     while (!told_to_end)

@@ -14,6 +14,9 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/ptrace.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -36,6 +39,19 @@ static void check(int right, const char *what)
         fprintf(stderr, "serial_test: %s\n", what);
         exit(1);
     }
+}
+
+/* For how long the machine seems to have been suspended; shared with the child. */
+static volatile int64_t *suspended_s;
+
+/* In the place of the C library's, here and in the program. */
+int clock_gettime(clockid_t clock, struct timespec *at)
+{
+    int result = (int)syscall(SYS_clock_gettime, clock, at);
+
+    if (clock == CLOCK_BOOTTIME)
+        at->tv_sec += *suspended_s;
+    return result;
 }
 
 static int64_t now_ms(void)
@@ -297,32 +313,151 @@ static void freeze(void)
     check(waitpid(t.pid, &found, WUNTRACED) == t.pid && WIFSTOPPED(found), "it does not stop");
 }
 
+/* After a silence: the last words, and nothing of what is sent then or was sent before. */
+static void expect_lost(void)
+{
+    char found[1024], letter;
+
+    expect_stop();
+    /* What was read before may have been answered. */
+    while ((letter = packet(found, sizeof found)) == 'K' || letter == 'T')
+        ;
+    check(letter == 'E' && strcmp(found, "last_words") == 0, "the loss of the line is not told");
+    send_packet('W', "more", 4);
+    send_packet('K', "", 0);
+    send_packet('C', "", 0);
+    while ((letter = packet(found, sizeof found)) == 'K' || letter == 'T')
+        ;
+    check(letter == 'C', "it does not close");
+    check(finish() == 0, "lost in silence");
+
+    size_t size = read_all(found, sizeof found);
+
+    check(size == 6 && memcmp(found, STOP, 6) == 0, "more than the last words was written");
+    close(t.master);
+}
+
+/* The VM says nothing for a while, and then goes on. */
+static void silence(void)
+{
+    start_on_pty("100");
+    send_packet('W', "go", 2);
+    char go[2];
+
+    read_exactly(t.master, go, 2);
+    pause_ms(150);
+    send_packet('W', "late", 4);
+    expect_lost();
+}
+
+/* The machine sleeps, so that nobody's clock of signs of life goes on. */
+static void suspended(void)
+{
+    start_on_pty("5000");
+    send_packet('K', "", 0);
+    expect('K', "");
+    *suspended_s += 10;
+    send_packet('W', "late", 4);
+    expect_lost();
+
+    /* Too short to matter. */
+    *suspended_s += 2;
+    start_on_pty("5000");
+    *suspended_s += 2;
+    send_packet('W', "go", 2);
+    char go[2];
+
+    read_exactly(t.master, go, 2);
+    check(memcmp(go, "go", 2) == 0 && finish() == 0, "a short sleep");
+    expect_stop();
+    close(t.master);
+}
+
+/* Program and VM sleep together, and nobody tells the program, as in a container that is frozen. */
+static void frozen_together(void)
+{
+    int found;
+
+    start_on_pty("200");
+    send_packet('K', "", 0);
+    expect('K', "");
+    if (ptrace(PTRACE_SEIZE, t.pid, NULL, NULL) != 0) {
+        fprintf(stderr, "serial_test: no ptrace here: not tested how it sleeps together with the VM\n");
+        check(finish() == 0, "no ptrace");
+        close(t.master);
+        return;
+    }
+    check(ptrace(PTRACE_INTERRUPT, t.pid, NULL, NULL) == 0, "it does not stop");
+    check(waitpid(t.pid, &found, 0) == t.pid && WIFSTOPPED(found), "it does not stop");
+    send_packet('W', "old", 3);
+    pause_ms(300);
+    send_packet('W', "late", 4);
+    check(ptrace(PTRACE_DETACH, t.pid, NULL, NULL) == 0, "it does not go on");
+    expect_lost();
+}
+
+/* Writes so much that some waits in the program; how much was taken by the line by then. */
+static size_t fill_line(void)
+{
+    static char much[1000];
+    char found[1024];
+    size_t sent = 0, taken = 0;
+
+    memset(much, 'x', sizeof much);
+    while (sent < taken + 5000) {
+        struct pollfd from = { .fd = t.out, .events = POLLIN };
+
+        send_packet('W', much, sizeof much);
+        sent += sizeof much;
+        while (poll(&from, 1, 5) > 0) {
+            check(packet(found, sizeof found) == 'T', "something else than what was taken");
+            taken += (size_t)(uint8_t)found[2] << 8 | (uint8_t)found[3];
+        }
+    }
+    return taken;
+}
+
+/* How much comes on the line before this, which comes last. */
+static size_t size_before(const char *ending)
+{
+    char last[3] = { 0 };
+    size_t size = 0;
+
+    while (size < 3 || memcmp(last, ending, 3) != 0) {
+        memmove(last, last + 1, 2);
+        read_exactly(t.master, last + 2, 1);
+        size++;
+    }
+    return size - 3;
+}
+
 /* Only the program is frozen, while the VM goes on. */
 static void frozen(void)
 {
-    static char much[1000];
-    char found[1024], last[3] = { 0 }, letter;
-    size_t size = 0, sent = 0, taken = 0;
+    char found[1024];
+    size_t taken;
 
-    /* What is said meanwhile is old when it goes on; then come the last words, and what is new. */
+    /* What is said meanwhile is old when it goes on, and what is new comes too late: nothing could be said to the
+       wheels for so long. */
     start_on_pty("500");
     freeze();
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 8; k++) {
         send_packet('W', "old", 3);
         send_packet('K', "", 0);
+        pause_ms(100);
     }
-    pause_ms(800);
-    kill(t.pid, SIGCONT);
-    expect_stop();
-    /* Of the signs of life one at least is answered. */
-    while ((letter = packet(found, sizeof found)) == 'T')
-        ;
-    check(letter == 'K', "a sign of life is not answered");
     send_packet('W', "new", 3);
+    kill(t.pid, SIGCONT);
+    expect_lost();
+
+    /* Frozen for a shorter time, it goes on. */
+    start_on_pty("2000");
+    freeze();
+    send_packet('W', "new", 3);
+    kill(t.pid, SIGCONT);
     read_exactly(t.master, found, 3);
-    check(memcmp(found, "new", 3) == 0, "something else than what is new");
+    check(memcmp(found, "new", 3) == 0 && finish() == 0, "frozen for a moment");
     expect_stop();
-    check(finish() == 0, "frozen");
     close(t.master);
 
     /* New last words are never too old, nor is the end of the VM. */
@@ -338,32 +473,34 @@ static void frozen(void)
     check(finish() == 0, "frozen at its end");
     close(t.master);
 
-    /* What the line had not taken is old too: of it there is so much that some waits in the program. */
+    /* What the line had not taken is old too. */
     start_on_pty("200");
-    memset(much, 'x', sizeof much);
-    while (sent < taken + 5000) {
-        struct pollfd from = { .fd = t.out, .events = POLLIN };
-
-        send_packet('W', much, sizeof much);
-        sent += sizeof much;
-        while (poll(&from, 1, 5) > 0) {
-            check(packet(found, sizeof found) == 'T', "something else than what was taken");
-            taken += (size_t)(uint8_t)found[2] << 8 | (uint8_t)found[3];
-        }
-    }
+    taken = fill_line();
     freeze();
     pause_ms(300);
     kill(t.pid, SIGCONT);
-    pause_ms(50);
-    send_packet('W', "new", 3);
-    while (size < 3 || memcmp(last, "new", 3) != 0) {
-        memmove(last, last + 1, 2);
-        read_exactly(t.master, last + 2, 1);
-        size++;
-    }
     /* It tells of 1024 at a time. */
-    check(size < taken + 1024 + 3, "what waited for the line was written after the freeze");
+    check(size_before("STO") < taken + 1024, "what waited for the line was written after the freeze");
     check(finish() == 0, "frozen with a full line");
+    close(t.master);
+}
+
+/* What the line does not take in time, while all are well, is too old as well. */
+static void slow_line(void)
+{
+    size_t taken;
+
+    start_on_pty("300");
+    taken = fill_line();
+    for (int k = 0; k < 10; k++) {
+        pause_ms(40);
+        send_packet('K', "", 0);
+    }
+    send_packet('W', "new", 3);
+    /* Nobody reads before that. */
+    pause_ms(20);
+    check(size_before("new") < taken + 1024, "what waited for the line was written too late");
+    check(finish() == 0, "a slow line");
     close(t.master);
 }
 
@@ -442,7 +579,9 @@ static int closed(uint8_t last[3])
 static void junk(int seed)
 {
     static uint8_t bytes[70000];
-    char *pty[] = { "serial", "--pty", "serial_test_link", "--last-words", STOP_HEX, "--keep-alive", "1", NULL };
+    /* Soon silent, or never. */
+    char *keep_alive = seed % 5 ? "100000" : "1";
+    char *pty[] = { "serial", "--pty", "serial_test_link", "--last-words", STOP_HEX, "--keep-alive", keep_alive, NULL };
     uint8_t last[3] = { 0 };
     int line, reading = seed / 2 % 2;
 
@@ -455,7 +594,7 @@ static void junk(int seed)
         line = open(pty[2], O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
         check(line >= 0, "the link leads nowhere");
     } else {
-        start_on_pty("1");
+        start_on_pty(keep_alive);
         line = t.master;
     }
     fcntl(line, F_SETFL, O_NONBLOCK);
@@ -503,10 +642,16 @@ int main(void)
 
     snprintf(folder, sizeof folder, "%s/serial_test_XXXXXX", temporary ? temporary : "/tmp");
     signal(SIGPIPE, SIG_IGN);
+    suspended_s = mmap(NULL, sizeof *suspended_s, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    check(suspended_s != MAP_FAILED, "no memory");
     check(mkdtemp(folder) && chdir(folder) == 0, "no folder");
     command_line();
     ways_to_end();
+    silence();
+    suspended();
+    frozen_together();
     frozen();
+    slow_line();
     unplugged();
     busy();
     settings();

@@ -27,11 +27,9 @@ defmodule Hal.CommandOutput do
       {:returned, result} -> result
       {:exited, status} -> exit({:shutdown, status})
     end
-  rescue
-    error in ErlangError ->
-      if error.original == :terminated,
-        do: exit({:shutdown, lost(name)}),
-        else: reraise(error, __STACKTRACE__)
+  catch
+    # Not `rescue`, which would make an `ErlangError` of what others failed with: a match, an undefined function.
+    :error, :terminated -> exit({:shutdown, lost(name)})
   end
 
   @doc """

@@ -15,6 +15,8 @@ defmodule Hal.Device do
       armed only while they report
     * `:was` - `{m, f, a}` that returns the last status of the previous process that the sinks
       know, or `nil`
+    * `:disarmed` - for a drive: `{m, f, a}` that returns the last reading `{:disarmed, by_person?}` that the sinks
+      know of the previous process, so that only a person arms again what a person has disarmed, or `false`
     * `:about` - a map that is merged into the metadata of its events, such as `%{robot: :mag1}`
     * `:name` - as in `GenServer`
     * `:clock` - `{m, f, a}` that returns integer milliseconds

@@ -27,7 +27,8 @@ defmodule Hal.Event do
   | `[:robot, :gate, :start]` | `at_ms` | `robot`, `latched?` |
   | `[:robot, :gate, :limits]` | `at_ms` | `robot`, `limits`: the reasons to limit the speed have changed |
   | `[:robot, :gate, :estop]`, `[:robot, :gate, :reset]` | `at_ms` | `robot` |
-  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board |
+  | `[:robot, :estop_file, :error]` | | `robot`, `file`, `reason`: the latch is set as ordered, but would not survive a restart of the board; it is tried again |
+  | `[:robot, :estop_file, :healed]` | | `robot`, `file`: it does now |
   | `[:robot, :departure_file, :failed]` | | `robot`, `file`: it cannot be noted that the robot has left its start pose; it is tried again each second |
   | `[:robot, :recorder, :failed]` | `at_ms` | `robots`, `robot` (the first of them), `line`: nothing can be recorded; a folder is tried again |
   | `[:robot, :recorder, :healed]` | `at_ms` | `robots`, `robot`, `file`: it is recorded again |
@@ -41,7 +42,7 @@ defmodule Hal.Event do
   | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same for a mission that does not return |
   | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same for a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
-  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds; `:refused`: `from`, `epoch`, `allowed`: that robot claims an epoch that no fleet can have reached, and is left out; `:given_up`: `x`, `y`, `blocked_by`: the robot gives up its way to that place; `:replacement`: `what` (`:changing`, `:replaced`, `:kept`, `:back`), `from` (the node that ordered it), `code` (its digest, or `nil`), `says`: another mission was put in the place of the robot's own (`Swarm.replace/2`) |
+  | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds; `:refused`: `from`, `epoch`, `allowed`: that robot claims an epoch that no fleet can have reached, and is left out; `:given_up`: `x`, `y`, `blocked_by`: the robot gives up its way to that place; `:crashed`: `crash`, what failed in its mission or in a behaviour, and where: the robot is idle; `:replacement`: `what` (`:changing`, `:replaced`, `:kept`, `:back`), `from` (the node that ordered it), `code` (its digest, or `nil`), `says`: another mission was put in the place of the robot's own (`Swarm.replace/2`) |
   | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): this node refused another one, or was refused by it |
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node crashed; it is restarted |
   | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: another robot of this name was there first; this one stays silent |

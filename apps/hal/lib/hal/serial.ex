@@ -36,14 +36,20 @@ defmodule Hal.Serial do
 
   The last words are what the line sends when its owner cannot: a stop. The port program writes
   them when the line is closed, when its process or the whole VM ends in any way, and after
-  `:keep_alive_ms` without a sign of life: then once, until the next one. Signs of life are
+  `:keep_alive_ms` without a sign of life. Signs of life are
   `write/2`, `last_words/2` and `keep_alive/1`. Earlier bytes that would delay them by more than
   20 ms are discarded, so half a packet may precede the last words. `Hal.Serial.Circuits` explains
   what they are worth without the port program.
 
+  Nothing follows the last words. An owner that was silent, because its VM was frozen or had no processor, does not
+  know what became of the device meanwhile, so **a line that has said its last words in silence is lost**: what is written
+  from then on is discarded, and the owner gets the error `:last_words`, at the latest from the first function that it
+  calls. It closes the line, and opens it anew. A line without last words outlives any silence. Nothing that was
+  written longer than `:keep_alive_ms` ago is sent by either.
+
   If only the port program is frozen, nothing can be sent on the line. `keep_alive/1`, called
-  often, returns `{:error, :frozen}` after half a second. When the program resumes, it discards
-  what is older than `keep_alive_ms`, and writes the last words.
+  often, returns `{:error, :frozen}` after half a second. When the program resumes after more than `keep_alive_ms`, it
+  writes the last words, and the line is lost.
 
   ## Overload
 
@@ -201,6 +207,11 @@ defmodule Hal.Serial do
   defp words(:terminated), do: "the port program was told to end"
   defp words(:overrun), do: "the line cannot take so much at once"
   defp words(:frozen), do: "its port program is frozen, so nothing can be said on the line"
+
+  defp words(:last_words),
+    do:
+      "the robot's program, or the one for this line, was frozen; the last words, a stop, were said"
+
   defp words(:clock), do: "this VM does not read the machine's monotonic clock"
   defp words(:closed), do: "closed"
   defp words(:timeout), do: "no answer"

@@ -12,7 +12,10 @@ defmodule Hal.LineHolder do
     vm
   end
 
-  @doc "In that VM: opens the line in a process that says that it is well every 20 ms, and answers `?` by `!`."
+  @doc """
+  In that VM: opens the line in a process that says that it is well every 20 ms, answers `?` by `!`, and opens a line
+  that it has lost anew.
+  """
   @spec hold(keyword()) :: :ok
   def hold(options) do
     me = self()
@@ -20,7 +23,7 @@ defmodule Hal.LineHolder do
     spawn(fn ->
       {:ok, line} = Serial.open(options)
       send(me, :open)
-      well(line)
+      well(line, options)
     end)
 
     receive do
@@ -28,15 +31,28 @@ defmodule Hal.LineHolder do
     end
   end
 
-  defp well(line) do
-    :ok = Serial.keep_alive(line)
+  defp well(line, options) do
+    with :ok <- Serial.keep_alive(line),
+         :ok <- answer(line) do
+      well(line, options)
+    else
+      {:error, :last_words} ->
+        :ok = Serial.close(line)
+        {:ok, line} = Serial.open(options)
+        well(line, options)
+    end
+  end
 
+  defp answer(line) do
     receive do
       message ->
-        with {:data, "?"} <- Serial.handle(line, message), do: :ok = Serial.write(line, "!")
-        well(line)
+        case Serial.handle(line, message) do
+          {:data, "?"} -> Serial.write(line, "!")
+          {:error, _reason} = error -> error
+          _other -> :ok
+        end
     after
-      20 -> well(line)
+      20 -> :ok
     end
   end
 end

@@ -10,6 +10,7 @@ defmodule Robot.Board do
   | `:odometry` `:sonar` `:ir` `:bumpers` `:power` | `:drive` | as in `Hal.Drive` |
   | `:brake` `:joystick` `:home` | `:drive` | as in `Hal.Drive` |
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
+  | `:disarmed` | `:drive` | whether a person has disarmed it |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
   | `:detections` | `:blob_detector` | `Vision.Detections`, at the time of its picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, at the time it began |
@@ -26,6 +27,7 @@ defmodule Robot.Board do
   | `{:hung, part}` | `:watch` | where `:gate`, `:executive` or `:pilot` hangs (4) |
   | `:departed` | `:executive` | the odometry frame in which it has left its start pose (`Robot.Departure`) |
   | `:pose` | `:executive` | the estimate in the `map` frame |
+  | `{:crashed, part}` | `:pilot`, `:executive` | why its mission, or a behaviour, crashed last (`Robot.Control.Crash`) |
   | `:asking` | `:pilot` | while a callback of the mission runs (5) |
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | the state of the mission and its claim (6) |
@@ -49,18 +51,17 @@ defmodule Robot.Board do
 
   After its end nothing is found on it, and what is written to it has no effect.
 
-  This process owns the tables, so that they survive a crash of their writers, and writes what must
-  survive more: the **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is
-  slow, or hangs, delays neither the gate's steps nor the executive's ticks. All the rest is lost
-  with the board, on purpose.
+  This process owns the tables, so that they survive a crash of their writers, and writes what must survive more: the
+  **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is slow, or hangs, delays neither the gate's
+  steps nor the executive's ticks. All the rest is lost with the board, on purpose.
 
-  The latch is a table of its own, written by the gate only, so that a gate that restarts is still
-  latched. With a file (real robots) it also survives a restart of the board and of the machine: the
-  file exists while the latch is set. Who must know that it does asks by `saved/2`.
+  The latch is a table of its own, written by the gate only, so that a gate that restarts is still latched. With a file
+  (real robots) it also survives a restart of the board and of the machine: the file exists while the latch is set. Who
+  must know asks by `saved/2`. A write that failed is tried again; until then `unsaved/1` says why.
   """
   use Hal.HardenedServer
   alias Hal.HardenedServer
-  alias Robot.Board.Files
+  alias Robot.Board.{Files, Latch}
   alias Robot.{Departure, Names}
   alias Vision.Detections
 
@@ -102,6 +103,7 @@ defmodule Robot.Board do
     joystick: :drive,
     home: :drive,
     arming: :drive,
+    disarmed: :drive,
     ptz: :ptz,
     detections: :blob_detector,
     driving: :gate,
@@ -227,31 +229,33 @@ defmodule Robot.Board do
 
   @doc "Whether the e-stop is latched; a robot whose board has ended is held."
   @spec latched?(t()) :: boolean()
-  def latched?(%__MODULE__{latch: latch}),
-    do: unless_ended(true, fn -> :ets.member(latch, :estop) end)
+  def latched?(%__MODULE__{latch: latch}), do: Latch.set?(latch)
 
-  @doc "Latches the e-stop. This process writes the file, and reports one that cannot be written."
+  @doc "Latches the e-stop. This process writes the file."
   @spec latch(t()) :: :ok
   def latch(%__MODULE__{latch: latch} = board) do
-    :ets.insert(latch, {:estop, true})
+    Latch.set(latch)
     cast(board, :latch)
   end
 
-  @doc "Releases the latch. If the file cannot be removed, the next start is latched again."
+  @doc "Releases the latch. Until the file can be removed, the next start is latched again."
   @spec unlatch(t()) :: :ok
   def unlatch(%__MODULE__{latch: latch} = board) do
-    :ets.delete(latch, :estop)
+    Latch.clear(latch)
     cast(board, :latch)
   end
 
-  @doc "Applies `then` when the file of the latch says what the latch does, or could not be written."
+  @doc "Applies `then` to `:ok`, if the file of the latch says what that does, or to `{:error, fault}` (`unsaved/1`)."
   @spec saved(t(), then :: Robot.Config.call()) :: :ok
   def saved(%__MODULE__{} = board, {_m, _f, _a} = then), do: cast(board, {:saved, then})
 
   @doc "Whether it does already: asked by whoever has waited long enough for `saved/2`."
   @spec saved?(t()) :: boolean()
-  def saved?(%__MODULE__{latch: latch} = board),
-    do: :ets.lookup(latch, :file) == [{:file, latched?(board)}]
+  def saved?(%__MODULE__{latch: latch}), do: Latch.saved?(latch)
+
+  @doc "The file of the latch that could not be written or removed, and why; `nil` if the last attempt succeeded."
+  @spec unsaved(t()) :: Files.fault() | nil
+  def unsaved(%__MODULE__{latch: latch}), do: Latch.unsaved(latch)
 
   @doc "Notes, for after a restart, that the robot has left its start pose; a failure is tried again each second."
   @spec depart(t(), Departure.frame()) :: :ok
@@ -276,21 +280,20 @@ defmodule Robot.Board do
     # So that it writes what it has been told to write before it ends.
     Process.flag(:trap_exit, true)
 
+    {files, latched?, frame} = Files.read(config)
+
     board = %__MODULE__{
       robot: config.id,
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),
-      latch: :ets.new(__MODULE__, [:public]),
+      latch: Latch.new(latched?),
       clock: config.clock,
       since_ms: Robot.Config.now(config)
     }
 
-    {files, latched?, frame} = Files.read(config)
-    :ets.insert(board.latch, {:file, latched?})
-    if latched?, do: :ets.insert(board.latch, {:estop, true})
     if frame, do: put(board, :executive, :departed, frame, board.since_ms)
 
     case Names.register(config.id, :board, board) do
-      :ok -> {:ok, {board, files}}
+      :ok -> {:ok, %{board: board, files: files, again: nil}}
       {:error, {:already_registered, pid}} -> {:stop, {:already_started, pid}}
     end
   end
@@ -299,10 +302,11 @@ defmodule Robot.Board do
   def handle_cast(:latch, s), do: {:noreply, save(s)}
 
   # The latch itself decides, not the order in which the messages of several processes arrive.
-  def handle_cast({:saved, {m, f, a} = then}, {board, _files} = s) do
-    if HardenedServer.callable?(then) do
-      unless saved?(board), do: save(s)
-      apply(m, f, a)
+  def handle_cast({:saved, {m, f, a} = then}, s) do
+    if HardenedServer.callable?(then, 1) do
+      s = if saved?(s.board), do: s, else: save(s)
+      fault = unsaved(s.board)
+      apply(m, f, a ++ [if(fault, do: {:error, fault}, else: :ok)])
       {:noreply, s}
     else
       HardenedServer.drop(s)
@@ -313,22 +317,22 @@ defmodule Robot.Board do
 
   @impl GenServer
   def handle_info(:depart, s), do: {:noreply, noted(s)}
+  def handle_info({:latch, ref}, %{again: {ref, _wait_ms}} = s), do: {:noreply, save(s)}
+  def handle_info({:latch, _old}, s), do: {:noreply, s}
 
-  defp save({board, files} = s) do
-    latched? = latched?(board)
-    :ok = Files.latch(files, latched?)
-    :ets.insert(board.latch, {:file, latched?})
-    s
+  defp save(s) do
+    {files, again} = Latch.save(s.board.latch, s.files, s.again)
+    %{s | files: files, again: again}
   end
 
-  defp noted({board, files} = s) do
-    with frame when frame != nil <- departed(board),
-         {:error, files} <- Files.depart(files, frame) do
+  defp noted(s) do
+    with frame when frame != nil <- departed(s.board),
+         {:error, files} <- Files.depart(s.files, frame) do
       Process.send_after(self(), :depart, @again_ms)
-      {board, files}
+      %{s | files: files}
     else
       nil -> s
-      {:ok, files} -> {board, files}
+      {:ok, files} -> %{s | files: files}
     end
   end
 
@@ -340,7 +344,7 @@ defmodule Robot.Board do
   end
 
   defp writer({:peer, _id}), do: :comms
-  defp writer({:health, device}), do: device
   defp writer({:hung, _part}), do: :watch
+  defp writer({kind, part}) when kind in [:health, :crashed], do: part
   defp writer(key), do: Map.get(@writers, key)
 end

@@ -110,6 +110,9 @@ defmodule Robot.Devices do
     [{Vision.Saver, options ++ ours}]
   end
 
+  @doc false
+  def disarmed?(board), do: match?({:ok, true, _at_ms}, Board.fetch(board, :disarmed, :infinity))
+
   defp device(config, board, kind, sinks) do
     case Map.fetch!(config, kind) do
       nil ->
@@ -123,6 +126,7 @@ defmodule Robot.Devices do
            arm: if(config.dry_run, do: :never, else: config.arm),
            sonar: kind == :drive and config.profile.sonars != [],
            was: {Board, :health, [board, kind]},
+           disarmed: {__MODULE__, :disarmed?, [board]},
            about: %{robot: config.id},
            sinks: sinks,
            clock: config.clock,

@@ -73,10 +73,13 @@ defmodule Robot.BoardTest do
   end
 
   defp saved(board) do
-    :ok = Board.saved(board, {Kernel, :send, [self(), :saved]})
-    assert_receive :saved
+    :ok = Board.saved(board, {__MODULE__, :tell, [self()]})
+    assert_receive {:saved, :ok}
     assert Board.saved?(board)
   end
+
+  @doc false
+  def tell(test, result), do: send(test, {:saved, result})
 
   test "the latch outlives everything where it has a file", %{tmp_dir: dir} do
     file = Path.join(dir, "estop")
@@ -112,17 +115,37 @@ defmodule Robot.BoardTest do
     assert File.exists?(file)
   end
 
-  test "a file that cannot be written is told, and the latch holds", %{tmp_dir: dir} do
-    tell = fn _event, _measurements, metadata, test -> send(test, metadata) end
-    :ok = Hal.Event.attach(:board6, [:robot, :estop_file, :error], tell, self())
-    on_exit(fn -> Hal.Event.detach(:board6) end)
-    board = board(:board6, estop_file: Path.join(dir, "missing/estop"))
+  test "a file that cannot be written is told, the latch holds, and it is written as soon as it can be",
+       %{
+         tmp_dir: dir
+       } do
+    tell = fn [_, _, event], _measurements, metadata, test -> send(test, {event, metadata}) end
+
+    for event <- [:error, :healed] do
+      :ok = Hal.Event.attach({:board6, event}, [:robot, :estop_file, event], tell, self())
+      on_exit(fn -> Hal.Event.detach({:board6, event}) end)
+    end
+
+    # Root may write into any folder, but not into a file as if it were one.
+    folder = Path.join(dir, "folder")
+    File.write!(folder, "")
+    file = Path.join(folder, "estop")
+    board = board(:board6, estop_file: file)
     Board.latch(board)
-    file = Path.join(dir, "missing/estop")
-    saved(board)
-    assert_received %{robot: :board6, file: ^file, reason: :enoent}
-    refute_received %{robot: :board6}
+    :ok = Board.saved(board, {__MODULE__, :tell, [self()]})
+    assert_receive {:saved, {:error, {^file, :enotdir}}}
+    refute Board.saved?(board)
+    assert Board.unsaved(board) == {file, :enotdir}
     assert Board.latched?(board)
+    assert_received {:error, %{robot: :board6, file: ^file, reason: :enotdir}}
+    refute_received {:error, %{robot: :board6}}
+
+    File.rm!(folder)
+    File.mkdir!(folder)
+    assert_receive {:healed, %{robot: :board6, file: ^file}}
+    assert File.read!(file) == "e-stop\n"
+    saved(board)
+    assert Board.unsaved(board) == nil
   end
 
   test "a percept holds what is fresh, and nothing else" do

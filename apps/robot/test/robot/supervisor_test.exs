@@ -74,6 +74,7 @@ defmodule Robot.SupervisorTest do
     [gate, drive] = parts(id, [:gate, :drive])
     before = parts(id, @above)
     listen(id)
+    listen(id, [:robot, :stage])
 
     log =
       capture_log(fn ->
@@ -83,6 +84,14 @@ defmodule Robot.SupervisorTest do
       end)
 
     assert log =~ "a bad behaviour"
+    assert_receive {[:robot, :stage], %{stage: :crashed, crash: crash}}
+    assert crash =~ ~r"^\(RuntimeError\) a bad behaviour, test/support/acts.ex:\d+$"
+    board = Board.find!(id)
+    assert {:ok, ^crash, _} = Board.fetch(board, {:crashed, :executive}, :infinity)
+    # It is told until another one begins.
+    assert Executive.goal(id, :roll, {Acts.Roll, twist: @zero}) == :ok
+    assert Board.fetch(board, {:crashed, :executive}, :infinity) == :error
+    Executive.goal(id, :roll, nil)
     forget_drives()
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero
     stands(150)
@@ -206,11 +215,17 @@ defmodule Robot.SupervisorTest do
     rolls()
     executive = Names.whereis(id, :executive)
     listen(id)
+    listen(id, [:robot, :stage])
 
     capture_log(fn ->
       catch_exit(Pilot.command(id, :raise))
       assert_receive {[:robot, :pilot, :phase], %{state: :idle}}
     end)
+
+    assert_receive {[:robot, :stage], %{stage: :crashed, crash: crash}}
+    assert crash =~ ~r"^\(RuntimeError\) the mission was told to, test/support/acts.ex:\d+$"
+    board = Board.find!(id)
+    assert {:ok, ^crash, _} = Board.fetch(board, {:crashed, :pilot}, :infinity)
 
     assert Names.whereis(id, :executive) == executive
     assert_receive {:drive, {:drive, twist}, _} when twist == @zero
@@ -364,6 +379,46 @@ defmodule Robot.SupervisorTest do
     assert_received {[:hal, :device, :offline], %{reason: :fell}}
     send(second, :open)
     assert_receive {[:hal, :device, :online], %{again?: true}}
+  end
+
+  test "what a person has disarmed stays so when its drive crashes, or is killed, with arm: :auto, too" do
+    id = robot(:fall20, arm: :auto)
+    drive = fn -> Names.whereis(id, :drive) end
+    assert Hal.Device.arming(drive.()).state == :armed
+    :ok = Hal.Device.disarm(drive.())
+
+    for end_it <- [fn -> kill(id, :drive) end, fn -> crash(id) end] do
+      before = drive.()
+      end_it.()
+      another_online(id, before)
+      assert %{state: :disarmed, by_person?: true} = Hal.Device.arming(drive.())
+    end
+
+    assert Hal.Device.arm(drive.()) == :ok
+    before = drive.()
+    kill(id, :drive)
+    another_online(id, before)
+    assert Hal.Device.arming(drive.()).state == :armed
+  end
+
+  defp another_online(id, before, left \\ 2_000) do
+    if left > 0 and Names.whereis(id, :drive) in [nil, before] do
+      receive(do: (:never -> :ok), after: (5 -> another_online(id, before, left - 1)))
+    else
+      # It says that it is offline before it takes anything.
+      _state = :sys.get_state(Names.whereis(id, :drive))
+      online(id)
+    end
+  end
+
+  defp crash(id) do
+    drive = Names.whereis(id, :drive)
+    monitor = Process.monitor(drive)
+
+    capture_log(fn ->
+      send(drive, :raise)
+      assert_receive {:DOWN, ^monitor, _, _, _}
+    end)
   end
 
   test "a drive that crashes over every message does not take the robot down" do

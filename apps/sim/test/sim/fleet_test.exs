@@ -43,6 +43,35 @@ defmodule Sim.FleetTest do
     eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
+  defmodule Failing do
+    @moduledoc "A mission that fails in its first ticks."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(_robot, _options), do: {:stand, 0, []}
+
+    @impl Robot.Mission
+    def handle({:tick, _percept}, 3), do: raise("boom")
+    def handle({:tick, _percept}, ticks), do: {:stand, ticks + 1, []}
+    def handle(_event, ticks), do: {:stand, ticks, []}
+  end
+
+  test "a mission that crashes is told where people look: stages, result, status" do
+    fleet = fleet(%{robots: [:mag79], landmark: :none, mission: {Failing, []}})
+
+    stage = eventually(fn -> Enum.find(Fleet.scene(fleet).stages, &(&1.stage == :crashed)) end)
+
+    assert %{robot: :mag79, crash: "(RuntimeError) boom, " <> place} = stage
+    assert place =~ ~r"^(apps/sim/)?test/sim/fleet_test.exs:\d+$"
+    assert inspect(Swarm.status(:mag79)) =~ "idle"
+    assert inspect(Swarm.status(:mag79)) =~ "CRASHED (RuntimeError) boom, " <> place
+    assert Enum.any?(Fleet.result(fleet).stages, &(&1.stage == :crashed))
+    # An order to this robot alone ends it.
+    assert order(fn -> Swarm.tell(:mag79, "wander") end) == :ok
+    refute inspect(Swarm.status(:mag79)) =~ "CRASHED"
+    stop(fleet)
+  end
+
   defmodule Ending do
     @moduledoc "A backend whose run cannot go on once it is told so."
     alias Sim.Fleet.Local

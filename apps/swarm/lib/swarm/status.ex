@@ -20,11 +20,15 @@ defmodule Swarm.Status do
   says why: `drive offline (/dev/ttyR0: no such device)` (`offline`: texts by device). A robot
   that is slow because it has no sonar is `BLIND`, and one that is because another may be near, which it cannot tell, is
   `CAUTIOUS` (`Robot.Behaviour.Avoid.Caution`). A robot that stands without being told to says
-  `FAULT`, and why (`fault`).
+  `FAULT`, and why (`fault`). One whose e-stop file does not say what the stop does says `E-STOP NOT ON ITS DISK`, or
+  `RESET NOT ON ITS DISK`, with the file and why (`estop_file`); it is tried again until it does.
 
   If a robot's gate, behaviour or mission hangs, it says so, also for a minute after the restart
   that follows (`Robot.Safety.LivenessMonitor`; `hung`: `:silent` or `:hung`, in what, and how
   long ago, ms).
+
+  One whose mission or behaviour crashed stands idle, and says `CRASHED`, what failed and where, until its next order
+  (`crashed`; `Robot.Control.Crash`).
 
   A robot that does not get to its place is `BLOCKED by …`, as its mission says (`blocked_by`); what that says in words of
   its own (`says`) stands there as it is.
@@ -72,9 +76,11 @@ defmodule Swarm.Status do
                 limits: [],
                 estop: false,
                 estop_by: [],
+                estop_file: nil,
                 arming: nil,
                 why: nil,
                 hung: nil,
+                crashed: nil,
                 leader: nil,
                 epoch: nil,
                 blocked_by: nil,
@@ -108,9 +114,11 @@ defmodule Swarm.Status do
           limits: [atom() | String.t()],
           estop: boolean(),
           estop_by: [String.t()],
+          estop_file: String.t() | nil,
           arming: Hal.Device.Arming.state() | nil,
           why: String.t() | nil,
           hung: {:silent | :hung, behaviour :: String.t(), ago_ms :: non_neg_integer()} | nil,
+          crashed: String.t() | nil,
           leader: atom() | String.t() | nil,
           epoch: non_neg_integer() | nil,
           blocked_by: String.t() | nil,
@@ -154,9 +162,11 @@ defmodule Swarm.Status do
         (entries |> value(:doing) |> field(:limits) || []) ++ (field(driving, :limits) || []),
       estop: Board.latched?(board),
       estop_by: entries |> value(:estop) |> callers(),
+      estop_file: unsaved(Board.unsaved(board)),
       arming: entries |> value(:arming) |> field(:state),
       why: entries |> value(:arming) |> field(:why),
       hung: hung(entries),
+      crashed: crashed(entries),
       leader: mission |> field(:claim) |> field(:leader),
       epoch: mission |> field(:claim) |> field(:epoch),
       blocked_by: mission |> field(:claim) |> field(:blocked_by),
@@ -183,6 +193,9 @@ defmodule Swarm.Status do
 
   defp callers(nil), do: []
   defp callers(stop), do: EStop.State.callers(stop)
+
+  defp unsaved(nil), do: nil
+  defp unsaved({file, reason}), do: "#{:file.format_error(reason)}: #{file}"
 
   defp words(config, device, reason),
     do: config |> Map.fetch!(device) |> Words.offline(reason)
@@ -212,6 +225,12 @@ defmodule Swarm.Status do
           do: {what, LivenessMonitor.words(part, module), ago_ms}
 
     Enum.min_by(hung, fn {what, _where, ago_ms} -> {what == :hung, ago_ms} end, fn -> nil end)
+  end
+
+  # Of both, the later one.
+  defp crashed(entries) do
+    crashed = for {{:crashed, _part}, {line, age_ms}} <- entries, do: {age_ms, line}
+    with {_age_ms, line} <- Enum.min(crashed, fn -> nil end), do: line
   end
 
   defp field(nil, _key), do: nil
@@ -259,11 +278,13 @@ defmodule Swarm.Status do
 
       [
         status.estop && "E-STOP" <> by(status.estop_by),
+        unsaved(status),
         Swarm.Status.arming(status),
         status.fault && "FAULT (#{status.fault})",
         limited?(status, "blind") && "BLIND (no sonar; slow)",
         limited?(status, "caution") && "CAUTIOUS (another robot may be near; slow)",
         hung(status.hung),
+        status.crashed && "CRASHED #{status.crashed}",
         status.blocked_by && "BLOCKED by #{status.blocked_by}",
         is_binary(status.says) && status.says,
         status.replaced,
@@ -289,6 +310,10 @@ defmodule Swarm.Status do
         _not_told -> "#{device} offline"
       end
     end
+
+    defp unsaved(%{estop_file: nil}), do: nil
+    defp unsaved(%{estop: true} = status), do: "E-STOP NOT ON ITS DISK (#{status.estop_file})"
+    defp unsaved(status), do: "RESET NOT ON ITS DISK (#{status.estop_file})"
 
     defp hung(nil), do: nil
     defp hung({:silent, where, _ago_ms}), do: "HANGS in #{where}"

@@ -84,6 +84,40 @@ defmodule Swarm.StatusTest do
         do: assert(Status.Row.decode(:mag1, %{row | hung: junk}, 10) == :error)
   end
 
+  test "a robot's row says what crashed, and which file does not take its e-stop" do
+    crash = "(RuntimeError) boom, lib/gather.ex:42"
+    file = "no space left on device: /var/estop"
+
+    status = %Status{
+      robot: :mag1,
+      node: node(),
+      age_ms: 5,
+      crashed: crash,
+      estop: true,
+      estop_file: file
+    }
+
+    row = Status.Row.encode(status)
+    assert {:ok, told} = Status.Row.decode(:mag1, row, 10)
+    assert inspect(told) =~ ", CRASHED (RuntimeError) boom, lib/gather.ex:42,"
+
+    assert inspect(told) =~
+             ", E-STOP, E-STOP NOT ON ITS DISK (no space left on device: /var/estop),"
+
+    released = Status.Row.encode(%{status | estop: false, crashed: nil})
+    assert {:ok, told} = Status.Row.decode(:mag1, released, 10)
+    assert inspect(told) =~ ", RESET NOT ON ITS DISK (no space"
+    refute inspect(told) =~ "CRASHED"
+
+    for key <- [:crashed, :estop_file],
+        junk <- [:x, 1, String.duplicate("x", 10_000)],
+        do: assert(Status.Row.decode(:mag1, %{row | key => junk}, 10) == :error)
+
+    # A text from outside is as long as it likes.
+    long = Status.Row.encode(%{status | crashed: String.duplicate("ä", 9_000)})
+    assert {:ok, %Status{}} = Status.Row.decode(:mag1, long, 10)
+  end
+
   test "the line says how sure the pose is, if that is known" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
     pose = Hal.Pose.new(1.2, 3.4, 1.5708)

@@ -5,7 +5,7 @@ defmodule Bench.Stop.Robot do
   @behaviour Robot.Behaviour
   alias Bench.Stop.WireTap
   alias Hal.{Device, Event, Twist}
-  alias Robot.{Board, Names, Wish}
+  alias Robot.{Names, Wish}
   alias Robot.Control.Pilot
 
   @id :mag1
@@ -47,17 +47,12 @@ defmodule Bench.Stop.Robot do
   def arm, do: until(fn -> Device.arm(Names.via(@id, :drive)) == :ok end)
 
   @doc """
-  Arms it again after its VM was frozen: the reports are old by then, which may have disarmed it.
+  Drives it again after its VM was frozen: its line has said the last words while the wheels turned, and is lost.
   """
   @spec thawed() :: :ok
   def thawed do
-    board = Board.find!(@id)
-    thawed_ms = Board.now(board)
-
-    until(fn ->
-      match?({:ok, _, at_ms} when at_ms > thawed_ms, Board.fetch(board, :odometry, 500))
-    end)
-
+    until(fn -> match?({:error, _reason}, arming()) end)
+    :ok = acknowledge()
     arm()
   end
 

@@ -92,9 +92,9 @@ defmodule Console.Calibrate.Live do
   end
 
   defp stopped(s) do
-    :ok = Gate.estop(s.robot)
+    saved = Gate.estop(s.robot)
     Output.finish(s.output)
-    IO.puts("EMERGENCY STOP: #{s.robot} is held")
+    IO.puts("EMERGENCY STOP: #{s.robot} is held#{unsaved(saved)}")
 
     with {:ok, "reset"} <-
            StdinPrompt.choose(s.talk, "type reset to let it drive again: ", ["reset"]),
@@ -102,6 +102,12 @@ defmodule Console.Calibrate.Live do
 
     {:error, "stopped by the user"}
   end
+
+  defp unsaved(:ok), do: ""
+
+  defp unsaved({:error, {file, reason}}),
+    do:
+      ", but would not be after a restart: #{file} cannot be written (#{:file.format_error(reason)})"
 
   defp look(s) do
     case odometry(s.robot) do

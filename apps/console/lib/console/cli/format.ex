@@ -17,6 +17,8 @@ defmodule Console.Cli.Format do
 
       iex> Console.Cli.Format.stage(%{stage: :elected, at_s: 12.34, robot: :mag2, epoch: 3, size_ppm: 41_000})
       "   12.3 s  elected         mag2 leads (epoch 3, landmark 4.1 % of its picture)"
+      iex> Console.Cli.Format.stage(%{stage: :crashed, at_s: 3.0, robot: :mag1, crash: "(RuntimeError) boom, lib/gather.ex:42"})
+      "    3.0 s  crashed         mag1: (RuntimeError) boom, lib/gather.ex:42"
       iex> Console.Cli.Format.stage(%{stage: :search, at_s: 0.0})
       "    0.0 s  search          every robot looks around for the landmark"
   """
@@ -41,6 +43,7 @@ defmodule Console.Cli.Format do
   @spec meaning(Sim.Scene.stage()) :: String.t()
   # A mission's own words.
   def meaning(%{says: says, robot: robot}), do: "#{robot} #{says}"
+  def meaning(%{stage: :crashed, robot: robot, crash: crash}), do: "#{robot}: #{crash}"
   def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
 

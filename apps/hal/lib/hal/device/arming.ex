@@ -58,6 +58,10 @@ defmodule Hal.Device.Arming do
   def new(:never), do: %__MODULE__{policy: :never, why: @dry_run}
   def new(policy) when policy in [:auto, :manual], do: %__MODULE__{policy: policy}
 
+  @doc "A fresh one of a drive that a person has disarmed before: only a person arms it."
+  @spec keep_disarmed(t()) :: t()
+  def keep_disarmed(%__MODULE__{} = arming), do: %{arming | by_person?: true}
+
   @doc """
   Takes whether the drive is ready now. An armed drive that is not ready is disarmed; a ready one
   with `:auto` is armed, unless a person has disarmed it.

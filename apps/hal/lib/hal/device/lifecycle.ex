@@ -155,8 +155,13 @@ defmodule Hal.Device.Lifecycle do
   @doc "Carries out a person's order for the wheels, and answers it."
   @spec order(State.t(), Arming.order()) :: {:ok | {:error, line :: String.t()}, State.t()}
   def order(s, order) do
+    by_person? = s.arming.by_person?
     {answer, arming} = Arming.order(s.arming, order, readiness(s))
     s = become(s, arming)
+
+    if arming.by_person? != by_person?,
+      do: Publisher.hand_on(s, {:disarmed, arming.by_person?})
+
     {carried_out(order, answer, s), s}
   end
 

@@ -10,6 +10,7 @@ defmodule Hal.Device.Options do
     arm: [{:one_of, [:auto, :manual, :never]}, default: :auto],
     sonar: [:boolean, default: false],
     was: [:mfa, default: nil],
+    disarmed: [:mfa, default: nil],
     about: [{:check, &is_map/1, "a map"}, default: %{}],
     sinks: [{:list, :mfa}, default: []],
     clock: [:mfa, default: {System, :monotonic_time, [:millisecond]}]
@@ -24,7 +25,7 @@ defmodule Hal.Device.Options do
     options = Options.check!(options, @table, "device")
     {driver, driver_options} = options[:driver]
 
-    Keyword.take(options, [:kind, :was, :about, :sinks, :clock]) ++
+    Keyword.take(options, [:kind, :was, :disarmed, :about, :sinks, :clock]) ++
       [
         device: options[:device] || options[:kind],
         driver: driver,

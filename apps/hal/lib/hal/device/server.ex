@@ -3,6 +3,7 @@ defmodule Hal.Device.Server do
   # Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
   # which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
   use Hal.HardenedServer
+  alias Hal.Device.Arming
   alias Hal.Device.{Confirmation, Lifecycle, Publisher, Requests, State}
   alias Hal.{HardenedServer, Twist}
 
@@ -14,8 +15,13 @@ defmodule Hal.Device.Server do
   def init(%State{} = s) do
     # So that `terminate/2` runs, and stops the wheels, when the supervisor stops this process.
     Process.flag(:trap_exit, true)
-    {:ok, succeed(s), {:continue, :open}}
+    {:ok, s |> keep_disarmed() |> succeed(), {:continue, :open}}
   end
+
+  defp keep_disarmed(%{disarmed: {m, f, a}, arming: %Arming{} = arming} = s),
+    do: if(apply(m, f, a), do: %{s | arming: Arming.keep_disarmed(arming)}, else: s)
+
+  defp keep_disarmed(s), do: s
 
   # The last status that the sinks know of the previous process, which may have been killed: whatever
   # it was, its wheels are disarmed now.

@@ -35,8 +35,8 @@ defmodule Hal.RFlex.Driver do
   sees to it that speeds are renewed.
 
   The brake is released before the first speed, and again when the controller reports that it is
-  set; `init` sets it. A driver that was held up until the line sent its last words starts again
-  in the same way: from rest, with the brake set.
+  set; `init` sets it. A driver that was held up until the line sent its last words loses the line (`Hal.Serial`), and
+  starts again in the same way: from rest, with the brake set.
 
   Without `distance` or `angle` there is no odometry, and every speed becomes a stop.
 
@@ -232,8 +232,9 @@ defmodule Hal.RFlex.Driver do
     s = s |> Speeds.say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> Counters.tell(at_ms)
     {standing, s} = standing(s, at_ms)
 
-    with :ok <- alive(s, at_ms),
-         :ok <- keep_alive(s),
+    # A driver that was silent itself does not say so of its base.
+    with :ok <- keep_alive(s),
+         :ok <- alive(s, at_ms),
          {:ok, s} <- pump(s, at_ms),
          do: {:ok, readings ++ standing, s}
   end

@@ -34,7 +34,7 @@ defmodule Hal.RFlex.Speeds do
     %{s | ramp: ramp, stepped_ms: at_ms}
   end
 
-  # After a pause of this length the line has sent its last words.
+  # After a pause of this length the line has sent its last words, and whatever this sends, it does not.
   defp pause_ms(s), do: s.options.serial[:keep_alive_ms] || 200
 
   defp stood(s), do: %{s | ramp: SlewLimiter.standing(s.ramp), said: nil, released?: false}

@@ -4,16 +4,18 @@ if Code.ensure_loaded?(Circuits.UART) do
     Opens a serial line (`Hal.Serial`) through `circuits_uart`, for programs that use it anyway (`MIX_TARGET` other than
     `host`). Robots with wheels should use `Hal.Serial.Native`, because here **this VM writes the last words**:
 
-      * when the line is closed, its owner ends or is silent, they are written
+      * when the line is closed, its owner ends or is silent, they are written; after a silence the line is lost
       * when the VM itself is killed, frozen or has crashed, they are **not**: the robot goes on
         until its controller, or somebody at the emergency stop, ends that
+      * when a frozen VM thaws, they are written then, and the line is lost, as after any silence; but bytes that
+        `circuits_uart` had taken before may leave first, and after a suspension of the machine none of this happens
 
     A process between the line and its owner (`Hal.Serial.Circuits.Server`) writes, so that the
     owner does not wait. Incoming bytes pile up in the mailbox of an owner that does not take
     them. There is no `:pty`.
 
     Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy`, `:eio`, `:enotty`, `:einval`,
-    `{:os, text}`, `{:exit, reason}`. Later ones: `:unplugged`, `{:exit, reason}`; of `write/2`
+    `{:os, text}`, `{:exit, reason}`. Later ones: `:unplugged`, `:last_words`, `{:exit, reason}`; of `write/2`
     and similar functions `:overrun`, `:closed`.
     """
     @behaviour Hal.Serial.Line

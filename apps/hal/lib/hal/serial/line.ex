@@ -23,6 +23,7 @@ defmodule Hal.Serial.Line do
           | :timeout
           | :clock
           | :frozen
+          | :last_words
           | {:exit, status :: term()}
           | {:os, String.t()}
 

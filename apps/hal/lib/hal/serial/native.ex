@@ -6,19 +6,23 @@ defmodule Hal.Serial.Native do
   The program keeps the timer of the signs of life. If it is killed itself, by the kernel or by an
   administrator's `kill -9`, there are no last words, and this side sees `{:exit, 137}`.
 
+  Every message to the program has the time of the machine's monotonic clock. The program writes nothing that is older
+  than `keep_alive_ms` (200 ms), and takes a greater distance between two signs of life for silence, however late it
+  hears of them: a VM and a program that are frozen together, as when the machine is suspended, lose the line, too.
+  This side judges by the same rule before it sends anything: the first function that is called after a silence
+  returns `{:error, :last_words}`.
+
   If only the program is frozen (`kill -STOP`), nothing can be sent on the line, not even the last
   words. The program no longer answers the signs of life, and `keep_alive/1` returns
-  `{:error, :frozen}` once five of them, and 500 ms, have passed without an answer. Every message
-  to the program has the time of the machine's monotonic clock, so when the program resumes, it
-  writes nothing that is older than `keep_alive_ms` (200 ms): after a freeze the line receives the
-  last words, or what is sent now.
+  `{:error, :frozen}` once five of them, and 500 ms, have passed without an answer. When the program resumes after
+  more than `keep_alive_ms`, it writes the last words and nothing else, and the line is lost.
 
   Errors of `open/1`: `:enoent`, `:eacces`, `:ebusy` (another program has locked it), `:eio`,
   `:enodev`, `:enxio` (nothing behind it), `:enotty` (not a serial device), `:speed` (the hardware
   cannot), `:einval`, `:eexist` (`:pty` would replace something), `:timeout`, `:clock` (the VM
   reads another clock than the program), `{:os, text}`, `{:exit, status}`. Later ones:
-  `:unplugged`, `:terminated` (by SIGTERM or SIGHUP, after the last words), `{:exit, reason}`; of
-  `write/2` and similar functions `:overrun`, `:closed`; of `keep_alive/1` also `:frozen`.
+  `:unplugged`, `:last_words`, `:terminated` (by SIGTERM or SIGHUP, after the last words), `{:exit, reason}`; of
+  `write/2` and similar functions `:overrun`, `:closed`, `:last_words`; of `keep_alive/1` also `:frozen`.
   """
   @behaviour Hal.Serial.Line
   alias Hal.Serial.Line
@@ -35,29 +39,37 @@ defmodule Hal.Serial.Native do
   @clocks_ms 5_000
 
   @reasons Map.new(
-             ~w(enoent eacces ebusy eio enodev enxio enotty einval eexist speed unplugged terminated)a,
+             ~w(enoent eacces ebusy eio enodev enxio enotty einval eexist speed unplugged terminated last_words)a,
              &{Atom.to_string(&1), &1}
            )
 
   # The counters: bytes written that the line has not taken; bytes taken that the program does not
   # know of yet; signs of life since the program's last answer, and when the first of these was
-  # given.
+  # given; when the last one was given, and how many bytes of last words there are.
   @under_way 1
   @untold 2
   @unanswered 3
   @unanswered_ms 4
+  @life_ms 5
+  @words 6
 
-  @enforce_keys [:port, :counters]
+  @enforce_keys [:port, :counters, :keep_alive_ms]
   defstruct @enforce_keys
 
-  @opaque t :: %__MODULE__{port: port(), counters: :counters.counters_ref()}
+  @opaque t :: %__MODULE__{
+            port: port(),
+            counters: :counters.counters_ref(),
+            keep_alive_ms: pos_integer()
+          }
 
   @impl Line
   def open(options) do
     program = Application.app_dir(:hal, "priv/serial")
     settings = [:binary, :exit_status, packet: 2, args: arguments(options)]
     port = Port.open({:spawn_executable, program}, settings)
-    line = %__MODULE__{port: port, counters: :counters.new(4, [])}
+    alive_ms = options[:keep_alive_ms]
+    line = %__MODULE__{port: port, counters: :counters.new(6, []), keep_alive_ms: alive_ms}
+    :counters.put(line.counters, @words, byte_size(options[:last_words]))
 
     receive do
       {^port, {:data, <<?O, at_ms::64>>}} -> same_clock(line, at_ms)
@@ -81,22 +93,45 @@ defmodule Hal.Serial.Native do
   end
 
   @impl Line
-  def last_words(%__MODULE__{} = line, words),
-    do: command(line, [?L, <<now_ms()::64>>, words])
+  def last_words(%__MODULE__{} = line, words) do
+    with :ok <- sign(line, ?L, words, now_ms()),
+         do: :counters.put(line.counters, @words, byte_size(words))
+  end
 
   @impl Line
   def keep_alive(%__MODULE__{} = line) do
     at_ms = now_ms()
 
-    if frozen?(line, at_ms) and frozen?(hear_answers(line), at_ms) do
-      {:error, :frozen}
-    else
-      if :counters.get(line.counters, @unanswered) == 0,
-        do: :counters.put(line.counters, @unanswered_ms, at_ms)
+    cond do
+      silent?(line, at_ms) ->
+        {:error, :last_words}
 
-      :counters.add(line.counters, @unanswered, 1)
-      command(line, [?K, <<at_ms::64>>])
+      frozen?(line, at_ms) and frozen?(hear_answers(line), at_ms) ->
+        {:error, :frozen}
+
+      true ->
+        if :counters.get(line.counters, @unanswered) == 0,
+          do: :counters.put(line.counters, @unanswered_ms, at_ms)
+
+        :counters.add(line.counters, @unanswered, 1)
+        sign(line, ?K, [], at_ms)
     end
+  end
+
+  # What this process does after a silence it decided before; the program, which has said the last words, or will when
+  # it reads this, would not write it.
+  defp sign(line, letter, body, at_ms) do
+    if silent?(line, at_ms) do
+      {:error, :last_words}
+    else
+      :counters.put(line.counters, @life_ms, at_ms)
+      command(line, [letter, <<at_ms::64>>, body])
+    end
+  end
+
+  defp silent?(%{counters: counters} = line, at_ms) do
+    :counters.get(counters, @words) > 0 and
+      at_ms - :counters.get(counters, @life_ms) > line.keep_alive_ms
   end
 
   # A VM that was frozen itself has given few signs meanwhile.
@@ -150,7 +185,7 @@ defmodule Hal.Serial.Native do
   end
 
   defp put(line, size, bytes) do
-    with :ok <- command(line, [?W, <<now_ms()::64>>, bytes]),
+    with :ok <- sign(line, ?W, bytes, now_ms()),
          do: :counters.add(line.counters, @under_way, size)
   end
 
@@ -178,6 +213,7 @@ defmodule Hal.Serial.Native do
   end
 
   defp same_clock(line, at_ms) do
+    :counters.put(line.counters, @life_ms, at_ms)
     if abs(now_ms() - at_ms) <= @clocks_ms, do: {:ok, line}, else: give_up(line, :clock)
   end
 

@@ -33,24 +33,6 @@ defmodule Hal.Serial.ContractTest do
     hear(near, size - byte_size(bytes), had <> bytes)
   end
 
-  # A sign of life, or a packet, that is older than 50 ms before the port program gets a processor counts for nothing,
-  # and must not; then there is another one.
-  defp comes(far, size, sign) do
-    assert sign.() == :ok
-    if begun = begins(far), do: read(far, size, begun), else: comes(far, size, sign)
-  end
-
-  defp begins(%{line: %{port: port}} = far) do
-    receive do
-      {^port, _} = message ->
-        with :unknown <- Serial.handle(far, message),
-             do: begins(far),
-             else: ({:data, bytes} -> bytes)
-    after
-      2_000 -> nil
-    end
-  end
-
   for module <- @modules do
     describe "#{inspect(module)}" do
       @describetag carrier: module
@@ -107,11 +89,20 @@ defmodule Hal.Serial.ContractTest do
         assert read(far, 6) == @stop
       end
 
-      test "last words in silence, once", %{carrier: module, link: link, far: far} do
+      test "last words in silence, and nothing after them", %{
+        carrier: module,
+        link: link,
+        far: far
+      } do
         near = open(module, link, keep_alive_ms: 50)
         assert read(far, 6) == @stop
-        assert comes(far, 6, fn -> Serial.keep_alive(near) end) == @stop
-        assert comes(far, 12, fn -> Serial.write(near, "going\r") end) == "going\r" <> @stop
+        assert said(near) == {:error, :last_words}
+        _discarded_or_refused = Serial.write(near, "going\r")
+        _discarded_or_refused = Serial.keep_alive(near)
+        :ok = Serial.close(near)
+        again = open(module, link)
+        :ok = Serial.write(again, "again\r")
+        refute read_until(far, "again\r") =~ "going"
       end
 
       test "unplugged", %{carrier: module, link: link, far: far} do

@@ -69,18 +69,47 @@ defmodule Hal.Serial.LastWordsTest do
     refute_more(far, near, "nothing said before this")
   end
 
-  test "in silence once, and again after each sign of life", %{link: link, far: far} do
+  test "in silence once; then the line is lost, whatever its owner says", %{link: link, far: far} do
     near = open(link, keep_alive_ms: 50)
     assert read(far, 6) == @stop
 
-    for life <- [&Serial.keep_alive/1, &Serial.write(&1, ""), &Serial.last_words(&1, @stop)] do
-      :ok = life.(near)
-      assert read(far, 6) == @stop
-    end
+    for life <- [&Serial.keep_alive/1, &Serial.write(&1, "go"), &Serial.last_words(&1, @stop)],
+        do: assert(life.(near) == {:error, :last_words})
 
-    # Had they come twice, they would stand before this.
-    :ok = Serial.write(near, "going\r")
-    assert read(far, 12) == "going\r" <> @stop
+    assert next(near) == {:error, :last_words}
+    :ok = Serial.close(near)
+    # At the closing, and nothing before that.
+    assert read(far, 6) == @stop
+    {:ok, again} = Serial.open(port: link)
+    refute_more(far, again, "nothing else")
+  end
+
+  test "in silence, which a line that has none outlives", %{link: link, far: far} do
+    near = open(link, last_words: "", keep_alive_ms: 50)
+    receive(do: (:never -> :ok), after: (150 -> :ok))
+    assert Serial.keep_alive(near) == :ok
+    :ok = Serial.last_words(near, @stop)
+    assert next(near) == {:error, :last_words}
+    assert read(far, 6) == @stop
+  end
+
+  test "though what was written before a silence still waits in the pipe", %{link: link, far: far} do
+    near = open(link, keep_alive_ms: 200)
+    program = os_pid(near)
+    kill(:STOP, program)
+    eventually(fn -> File.read!("/proc/#{program}/stat") =~ ") T " end)
+    :ok = Serial.write(near, "old speed\r")
+    receive(do: (:never -> :ok), after: (300 -> :ok))
+    # As from a VM that thaws before its program does, and knows nothing of it.
+    :counters.put(near.line.counters, 6, 0)
+    :ok = Serial.write(near, "late speed\r")
+    kill(:CONT, program)
+    assert read(far, 6) == @stop
+    assert next(near) == {:error, :last_words}
+    :ok = Serial.close(near)
+    {:ok, again} = Serial.open(port: link)
+    assert read(far, 6) == @stop
+    refute_more(far, again, "nothing else")
   end
 
   test "not while there are signs of life", %{link: link, far: far} do
@@ -155,13 +184,17 @@ defmodule Hal.Serial.LastWordsTest do
       eventually(fn -> match?({:ok, _}, Serial.open(port: link)) end)
     end
 
-    test "that is frozen, and comes back", %{link: link, far: far} do
+    test "that is frozen, and comes back: it opens its line anew", %{link: link, far: far} do
       os_pid = start_vm(port: link, last_words: @stop)
-      # Heard while it is frozen.
-      kill_and_hear(:STOP, os_pid, far)
-      kill(:CONT, os_pid)
       :ok = Serial.write(far, "?")
       assert read(far, 1) == "!"
+      # Heard while it is frozen.
+      kill_and_hear(:STOP, os_pid, far)
+      :ok = Serial.write(far, "?")
+      kill(:CONT, os_pid)
+      # It answers by the old line, which says only the last words, at its closing.
+      assert read(far, 6) == @stop
+      eventually(fn -> answers?(far) end)
       kill_and_hear(:STOP, os_pid, far)
       kill(:CONT, os_pid)
     end
@@ -171,6 +204,18 @@ defmodule Hal.Serial.LastWordsTest do
       kill(:STOP, os_pid)
       assert flood_until(far, "") == @stop
       kill(:CONT, os_pid)
+    end
+  end
+
+  # What is said before the line is open nobody hears.
+  defp answers?(%{line: %{port: port}} = far) do
+    :ok = Serial.write(far, "?")
+
+    receive do
+      {^port, {:data, <<?D, bytes::binary>>}} = message ->
+        assert {bytes, Serial.handle(far, message)} == {"!", {:data, "!"}}
+    after
+      50 -> false
     end
   end
 

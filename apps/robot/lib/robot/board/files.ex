@@ -7,15 +7,19 @@ defmodule Robot.Board.Files do
   alias Robot.Departure
 
   @enforce_keys [:robot, :estop, :departure]
-  defstruct @enforce_keys ++ [told?: false]
+  defstruct @enforce_keys ++ [told?: false, failed: nil]
 
-  @typedoc "`told?`: a note that failed has been reported."
+  @typedoc "`told?`: a note that failed has been reported; `failed`: why the e-stop file is not as the latch is."
   @type t :: %__MODULE__{
           robot: atom(),
           estop: Path.t() | nil,
           departure: Path.t() | nil,
-          told?: boolean()
+          told?: boolean(),
+          failed: File.posix() | nil
         }
+
+  @typedoc "A file that could not be written or deleted, and why."
+  @type fault :: {Path.t(), File.posix()}
 
   @doc "The files of a robot, its latch, and the frame in which it has left its start pose, as they say."
   @spec read(Robot.Config.t()) :: {t(), latched? :: boolean(), Departure.frame() | nil}
@@ -25,16 +29,29 @@ defmodule Robot.Board.Files do
     {files, latched?, Departure.Note.read(departure)}
   end
 
-  @doc "Makes the e-stop file say whether the latch is set, or reports that it cannot."
-  @spec latch(t(), latched? :: boolean()) :: :ok
-  def latch(%__MODULE__{estop: nil}, _latched?), do: :ok
+  @doc "Makes the e-stop file say whether the latch is set. Reports once why it cannot, and that it could again."
+  @spec latch(t(), latched? :: boolean()) :: {:ok | {:error, fault()}, t()}
+  def latch(%__MODULE__{estop: nil} = files, _latched?), do: {:ok, files}
 
-  def latch(%__MODULE__{robot: robot, estop: path}, latched?) do
-    with {:error, reason} <- write(path, latched?) do
-      about = %{robot: robot, file: path, reason: reason}
-      Event.execute([:robot, :estop_file, :error], %{}, about)
+  def latch(%__MODULE__{estop: path} = files, latched?) do
+    case write(path, latched?) do
+      :ok ->
+        if files.failed, do: event(files, :healed, %{})
+        {:ok, %{files | failed: nil}}
+
+      {:error, reason} ->
+        if reason != files.failed, do: event(files, :error, %{reason: reason})
+        {{:error, {path, reason}}, %{files | failed: reason}}
     end
   end
+
+  defp event(%{robot: robot, estop: path}, name, more),
+    do:
+      Event.execute(
+        [:robot, :estop_file, name],
+        %{},
+        Map.merge(%{robot: robot, file: path}, more)
+      )
 
   defp write(path, true), do: File.write(path, "e-stop\n", [:raw, :sync])
   defp write(path, false), do: with({:error, :enoent} <- :file.delete(path, [:raw]), do: :ok)

@@ -17,7 +17,7 @@ defmodule Robot.Control.Executive do
   use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
   alias Robot.{Board, Departure, Mission, Names, Percept}
-  alias Robot.Control.{Controller, Inbox}
+  alias Robot.Control.{Controller, Crash, Inbox}
   alias Robot.Trace
   alias Robot.Safety.{DryRun, Gate, Readiness}
 
@@ -185,7 +185,7 @@ defmodule Robot.Control.Executive do
   @impl GenServer
   def handle_info(:tick, s) do
     begun = System.monotonic_time(:microsecond)
-    s = tick(s, Robot.Config.now(s.config))
+    s = Crash.told(s.config, s.board, :executive, fn -> tick(s, Robot.Config.now(s.config)) end)
     took = System.monotonic_time(:microsecond) - begun
 
     if took > @slow_us do
@@ -210,6 +210,7 @@ defmodule Robot.Control.Executive do
     do: %{s | controller: controller}
 
   defp pursue(s, controller) do
+    if controller.module, do: Crash.over(s.board, :executive)
     Board.put(s.board, :executive, :goal, controller.module, Robot.Config.now(s.config))
     %{s | controller: controller}
   end

@@ -21,7 +21,7 @@ defmodule Robot.Control.Pilot do
   use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Robot.{Board, Mission, Names, Percept}
-  alias Robot.Control.{Delivery, Executive, Inbox}
+  alias Robot.Control.{Crash, Delivery, Executive, Inbox}
   alias Robot.Control.Pilot.{Effects, Journal}
   alias Robot.Mission.Runner
   alias Robot.Safety.{Gate, Readiness}
@@ -271,6 +271,7 @@ defmodule Robot.Control.Pilot do
     with {:ok, runner} <- Runner.resume(data.runner),
          :ok <- Readiness.of(data.config, data.board) do
       Journal.heard(:resume, data)
+      Crash.over(data.board, :pilot)
       go({:hand, runner.module}, event, state, %{data | runner: runner})
     end
   end
@@ -284,6 +285,7 @@ defmodule Robot.Control.Pilot do
     with {:ok, options} <- mission(module, options, data),
          :ok <- Readiness.of(data.config, data.board) do
       Journal.heard({:start, module, options}, data)
+      Crash.over(data.board, :pilot)
       Effects.drop_orders(data.config)
       result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
       follow(result, state, %{data | options: options})
@@ -339,7 +341,8 @@ defmodule Robot.Control.Pilot do
 
   defp follow({runner, effects}, before, data) do
     data = %{data | runner: runner}
-    Enum.each(effects, &Effects.carry_out(&1, data.config))
+    carry_out = fn -> Enum.each(effects, &Effects.carry_out(&1, data.config)) end
+    Crash.told(data.config, data.board, :pilot, carry_out)
     state = Runner.state(runner)
     {:ok, state, Journal.changed(before, state, runner.claim, data)}
   end

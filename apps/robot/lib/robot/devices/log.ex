@@ -20,6 +20,7 @@ defmodule Robot.Devices.Log do
     [:robot, :fault],
     [:robot, :stage],
     [:robot, :estop_file, :error],
+    [:robot, :estop_file, :healed],
     [:robot, :departure_file, :failed],
     [:robot, :executive, :away],
     [:vision, :saver, :failed],
@@ -105,7 +106,7 @@ defmodule Robot.Devices.Log do
   def line(:error, %{robot: robot, file: file, reason: reason}) do
     {:error,
      "#{robot}: the e-stop file #{file} is not as the stop is (#{:file.format_error(reason)}): the stop holds as " <>
-       "it was told, but would not outlive a restart of the machine so"}
+       "it was told, but would not outlive a restart of the machine so; the file is tried again"}
   end
 
   def line(:dropped, %{name: name, count: count}) do
@@ -133,6 +134,9 @@ defmodule Robot.Devices.Log do
   def line(:healed, %{robots: [robot | _], file: file}),
     do: {:info, "#{robot}: recorded again, in #{file}"}
 
+  def line(:healed, %{robot: robot, file: file}),
+    do: {:info, "#{robot}: the e-stop file #{file} is as the stop is"}
+
   def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
 
   def line(:duplicate_id, %{robot: robot, other: other}) do
@@ -156,6 +160,9 @@ defmodule Robot.Devices.Log do
 
   def line(:stage, %{stage: :replacement, what: what, robot: robot, says: says}),
     do: {if(what == :back, do: :warning, else: :info), "#{robot} #{says}"}
+
+  def line(:stage, %{stage: :crashed, robot: robot, crash: crash}),
+    do: {:error, "#{robot} crashed, and is idle: #{crash}"}
 
   def line(:stage, _told_by_others), do: nil
 

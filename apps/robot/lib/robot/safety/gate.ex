@@ -51,11 +51,12 @@ defmodule Robot.Safety.Gate do
 
   @doc """
   Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
-  the drive's device, and the latch is in its file (`Robot.Board.saved/2`). The process that owns
+  the drive's device, and the latch is in its file, or the error says which file could not be written, and why
+  (`Robot.Board.saved/2`). The process that owns
   the state of the e-stop sets the latch with `tell: false`: then the config's `:on_latch` is not
   applied, and this does not wait for the file. Anybody else stops the gate directly, as `mix calibrate` does.
   """
-  @spec estop(robot :: atom(), tell: boolean()) :: :ok
+  @spec estop(robot :: atom(), tell: boolean()) :: :ok | {:error, {Path.t(), File.posix()}}
   def estop(robot, options \\ []),
     do: GenServer.call(Names.via(robot, :gate), {:estop, Keyword.get(options, :tell, true)})
 
@@ -143,7 +144,7 @@ defmodule Robot.Safety.Gate do
     Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
     # Whoever stops it directly may wait for a disk; these steps do not.
     if tell?,
-      do: Board.saved(s.board, {GenServer, :reply, [from, :ok]}),
+      do: Board.saved(s.board, {GenServer, :reply, [from]}),
       else: GenServer.reply(from, :ok)
 
     {:noreply, s}

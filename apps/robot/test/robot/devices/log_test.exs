@@ -73,6 +73,11 @@ defmodule Robot.Devices.LogTest do
 
     assert {:warning, "mag1: mag9 says epoch 500000000, " <> line} = Log.line(:stage, about)
     assert line =~ "at most 1000007 is allowed"
+    crash = %{robot: :mag1, stage: :crashed, crash: "(RuntimeError) boom, lib/gather.ex:42"}
+
+    assert Log.line(:stage, crash) ==
+             {:error, "mag1 crashed, and is idle: (RuntimeError) boom, lib/gather.ex:42"}
+
     assert Log.line(:stage, %{robot: :mag1, stage: :elected, epoch: 1, size_ppm: 9}) == nil
   end
 end

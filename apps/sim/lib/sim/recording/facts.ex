@@ -15,7 +15,9 @@ defmodule Sim.Recording.Facts do
           do: " #{key} #{value}"
 
     level =
-      if stage in [:killed, :lost, :refused, :cannot_form, :given_up], do: :warning, else: :info
+      if stage in [:killed, :lost, :refused, :cannot_form, :given_up, :crashed],
+        do: :warning,
+        else: :info
 
     Foxglove.log(ns, level, "#{about[:robot] || "fleet"}", "#{stage}#{facts}")
   end

@@ -58,13 +58,20 @@ defmodule Sim.Hardware.LineTest do
     |> Stream.take_while(fn _ -> System.monotonic_time(:millisecond) < until_ms end)
   end
 
+  # As a person who has looked: a robot that got no processor for so long that its line said its last words while the
+  # wheels turned has lost it.
+  defp arm(id) do
+    _nothing_was_lost = Swarm.acknowledge(id)
+    Swarm.arm(id)
+  end
+
   # A base that gets no processor for so long that its line is silent disarms the wheels; then it is armed again.
   defp rolls(context, id) do
-    eventually(fn -> Swarm.arm(id) == :ok end)
+    eventually(fn -> arm(id) == :ok end)
     x = place(context).x
 
     eventually(fn ->
-      if :disarmed in limits(id), do: Swarm.arm(id)
+      if :disarmed in limits(id), do: arm(id)
       _done_or_not = Swarm.tell(id, "move:0.2:0")
       place(context).x > x + 0.1
     end)
@@ -164,6 +171,7 @@ defmodule Sim.Hardware.LineTest do
   @stalls [
     "drive disarmed: its base reports nothing",
     "its port program is frozen",
+    "the last words, a stop, were said",
     "the base does not report",
     "drive online again",
     "unplugged",
@@ -250,7 +258,7 @@ defmodule Sim.Hardware.LineTest do
   # A bumper that is pressed while the pilot believes the wheels disarmed is no new touch: if the line was silent in
   # between (above), it is let go and pressed again. Returns where the body stood when it was pressed.
   defp holds_bumper(context, emulator, id) do
-    eventually(fn -> Swarm.arm(id) == :ok end)
+    eventually(fn -> arm(id) == :ok end)
     eventually(fn -> :disarmed not in limits(id) and still?(context) end)
     start = place(context)
     :ok = Emulator.change(emulator, :hold, [[0]])
@@ -321,7 +329,7 @@ defmodule Sim.Hardware.LineTest do
 
     eventually(fn ->
       # As in `rolls`.
-      if :disarmed in limits(id), do: Swarm.arm(id)
+      if :disarmed in limits(id), do: arm(id)
       _done_or_not = Swarm.tell(id, "move:-0.1:0")
       Pose.distance(stood, place(context)) > 0.1
     end)

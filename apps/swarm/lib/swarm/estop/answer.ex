@@ -39,9 +39,21 @@ defmodule Swarm.EStop.Answer do
   @doc "Answers an e-stop, as soon as its file is written if the answer is `:ok`."
   @spec save(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
   def save(robot, ref, :ok),
-    do: Board.saved(Board.find!(robot), {Nonblocking, :answer, [ref, :ok]})
+    do: Board.saved(Board.find!(robot), {__MODULE__, :saved, [robot, ref]})
 
   def save(_robot, ref, error), do: Nonblocking.answer(ref, error)
+
+  @doc "Called by the board: answers an e-stop whose file has been written, or could not be."
+  @spec saved(atom(), reference(), :ok | {:error, {Path.t(), File.posix()}}) :: :ok
+  def saved(_robot, ref, :ok), do: Nonblocking.answer(ref, :ok)
+
+  def saved(robot, ref, {:error, {file, reason}}) do
+    why =
+      "the stop is not in its file #{file} (#{:file.format_error(reason)}), and would not survive a restart of the " <>
+        "machine; the file is tried again"
+
+    Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
+  end
 
   @doc "Answers an e-stop whose file is not written yet; nobody hears it after another answer."
   @spec unsaved(atom(), Board.t(), reference()) :: :ok

@@ -14,6 +14,7 @@ defmodule Swarm.EStop.Broadcaster do
   use Hal.HardenedServer
   alias Hal.HardenedServer
   alias Mesh.Nonblocking
+  alias Robot.Names
   alias Swarm.Directory
   alias Swarm.EStop.Calls
 
@@ -106,7 +107,9 @@ defmodule Swarm.EStop.Broadcaster do
   end
 
   defp send_out(call, age_ms) do
-    for pid <- Directory.members(:estops), do: Nonblocking.cast(pid, {:estop, call, age_ms})
+    # Those of this node, too, while the directory is gone, or has just been started again.
+    pids = Enum.uniq(Names.all(:estop) ++ Directory.members(:estops))
+    for pid <- pids, do: Nonblocking.cast(pid, {:estop, call, age_ms})
     Mesh.broadcast(:stop, {:estop, call, age_ms})
   end
 

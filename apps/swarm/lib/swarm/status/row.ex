@@ -38,8 +38,10 @@ defmodule Swarm.Status.Row do
     |> arming(status.arming)
     |> offline(status)
     |> given(:fault, status.fault)
+    |> given(:estop_file, status.estop_file && short(status.estop_file))
     |> given(:blocked_by, status.blocked_by)
     |> hung(status.hung)
+    |> given(:crashed, status.crashed && String.slice(status.crashed, 0, 3 * @words))
     |> uncertain(status.uncertainty)
     |> given(:frame, status.frame && Status.Frame.encode(status.frame))
     |> given(:epoch, status.epoch)
@@ -96,6 +98,8 @@ defmodule Swarm.Status.Row do
          {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
          {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
          {:ok, says} <- text(Map.get(row, :says), 4 * @words),
+         {:ok, crashed} <- text(Map.get(row, :crashed), 12 * @words),
+         {:ok, estop_file} <- text(Map.get(row, :estop_file), 4 * @words),
          epoch = Map.get(row, :epoch),
          true <- epoch == nil or Wire.number?(epoch),
          true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
@@ -122,11 +126,13 @@ defmodule Swarm.Status.Row do
          speed: speed && speed / 1000,
          limits: Enum.map(limits, &Blackboard.Codec.word/1),
          estop: estop,
+         estop_file: estop_file,
          arming: arming,
          leader: leader && Blackboard.Codec.word(leader),
          says: says,
          blocked_by: blocked_by,
          hung: hung,
+         crashed: crashed,
          power: power,
          health: Map.new(offline, &{Blackboard.Codec.word(&1), {:offline, :unknown}}),
          offline:

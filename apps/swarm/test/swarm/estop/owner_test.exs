@@ -62,6 +62,40 @@ defmodule Swarm.EStop.OwnerTest do
     assert File.read!(file) == "e-stop\n"
   end
 
+  @tag :tmp_dir
+  test "an e-stop that its file does not take is no success: the answer and the status name the file until it holds",
+       %{
+         tmp_dir: folder
+       } do
+    # Root may write into any folder, but not into a file as if it were one.
+    place = Path.join(folder, "place")
+    File.write!(place, "")
+    file = Path.join(place, "estop")
+    id = robot(:owner_full, estop_file: file)
+    why = "#{id} is held, but the stop is not in its file #{file} (not a directory)"
+
+    for _ <- 1..2 do
+      assert {:error, line} = Swarm.ask(id, :estop)
+      assert line =~ why
+      assert latched?(id)
+    end
+
+    assert inspect(Swarm.status(id)) =~ "E-STOP NOT ON ITS DISK (not a directory: #{file})"
+    File.rm!(place)
+    File.mkdir!(place)
+    eventually(fn -> File.exists?(file) end)
+    refute inspect(Swarm.status(id)) =~ "NOT ON ITS DISK"
+    assert Swarm.ask(id, :estop) == :ok
+
+    # A reset that the disk does not take is carried out, and told as well: the next start would be held.
+    File.rm!(file)
+    File.mkdir!(file)
+    assert Swarm.ask(id, :reset) == :ok
+    eventually(fn -> inspect(Swarm.status(id)) =~ "RESET NOT ON ITS DISK (" end)
+    File.rmdir!(file)
+    eventually(fn -> not (inspect(Swarm.status(id)) =~ "NOT ON ITS DISK") end)
+  end
+
   test "if a latch changed often during a delay, it follows the last change" do
     id = robot(:owner_late)
     estop = Names.whereis(id, :estop)

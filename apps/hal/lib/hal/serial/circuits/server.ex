@@ -11,8 +11,8 @@ if Code.ensure_loaded?(Circuits.UART) do
     # If a write takes longer than this, the line is stuck.
     @write_ms 100
 
-    @enforce_keys [:uart, :owner, :under_way, :words, :keep_alive_ms]
-    defstruct @enforce_keys ++ [silence: nil, open?: true]
+    @enforce_keys [:uart, :owner, :under_way, :words, :keep_alive_ms, :life_ms]
+    defstruct @enforce_keys ++ [silence: nil, open?: true, lost?: false]
 
     @impl GenServer
     def init({owner, under_way, options}) do
@@ -37,7 +37,8 @@ if Code.ensure_loaded?(Circuits.UART) do
             owner: owner,
             under_way: under_way,
             words: options[:last_words],
-            keep_alive_ms: options[:keep_alive_ms]
+            keep_alive_ms: options[:keep_alive_ms],
+            life_ms: Hal.Clock.now_ms()
           }
 
           {:ok, alive(keeper)}
@@ -50,7 +51,8 @@ if Code.ensure_loaded?(Circuits.UART) do
     @impl GenServer
     def handle_cast({:write, size, bytes}, s) do
       s = alive(s)
-      result = if s.open?, do: UART.write(s.uart, bytes, @write_ms), else: :ok
+      writes? = s.open? and not s.lost?
+      result = if writes?, do: UART.write(s.uart, bytes, @write_ms), else: :ok
       :atomics.sub(s.under_way, 1, size)
       {:noreply, check(result, s)}
     end
@@ -74,8 +76,7 @@ if Code.ensure_loaded?(Circuits.UART) do
       {:noreply, s}
     end
 
-    def handle_info({:silence, ref}, %{silence: {_timer, ref}} = s),
-      do: {:noreply, check(speak(s), s)}
+    def handle_info({:silence, ref}, %{silence: {_timer, ref}} = s), do: {:noreply, lose(s)}
 
     def handle_info({:silence, _old}, s), do: {:noreply, s}
 
@@ -110,10 +111,25 @@ if Code.ensure_loaded?(Circuits.UART) do
 
     defp speaks?(s), do: s.open? and s.words != <<>>
 
+    # After a freeze a sign of life may be heard before the timer is.
     defp alive(s) do
       with {timer, _ref} <- s.silence, do: Process.cancel_timer(timer)
+      now_ms = Hal.Clock.now_ms()
+      s = if now_ms - s.life_ms > s.keep_alive_ms, do: lose(s), else: s
       ref = make_ref()
-      %{s | silence: {Process.send_after(self(), {:silence, ref}, s.keep_alive_ms), ref}}
+      timer = Process.send_after(self(), {:silence, ref}, s.keep_alive_ms)
+      %{s | silence: {timer, ref}, life_ms: now_ms}
+    end
+
+    # Nothing follows the last words but those at the closing.
+    defp lose(s) do
+      if speaks?(s) and not s.lost? do
+        s = check(speak(s), s)
+        send(s.owner, {self(), {:error, :last_words}})
+        %{s | lost?: true}
+      else
+        s
+      end
     end
 
     defp check(:ok, s), do: s

@@ -8,6 +8,7 @@ defmodule Robot.Control.Pilot.Journal do
   # that does not return.
   alias Hal.Event
   alias Robot.Board
+  alias Robot.Control.Crash
   alias Robot.Trace
 
   @typedoc "The part of a pilot's data that is needed here; `since_ms` is when its state began."
@@ -46,7 +47,7 @@ defmodule Robot.Control.Pilot.Journal do
 
   @doc """
   Calls a callback of a mission, with an entry on the board while it runs; `nil` for no mission,
-  with no entry. Each call has another entry.
+  with no entry. Each call has another entry. One that fails is told (`Robot.Control.Crash`).
   """
   @spec asking(module() | nil, data(), asked :: function()) :: term()
   def asking(nil, _data, function), do: function.()
@@ -54,7 +55,7 @@ defmodule Robot.Control.Pilot.Journal do
   def asking(module, %{board: board, config: config}, function) do
     call = {module, System.unique_integer()}
     Board.put(board, :pilot, :asking, call, Robot.Config.now(config))
-    result = function.()
+    result = Crash.told(config, board, :pilot, function)
     answered(board)
     result
   end
