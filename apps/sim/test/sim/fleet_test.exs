@@ -63,7 +63,7 @@ defmodule Sim.FleetTest do
 
     assert %{robot: :mag79, crash: "(RuntimeError) boom, " <> place} = stage
     assert place =~ ~r"^(apps/sim/)?test/sim/fleet_test.exs:\d+$"
-    assert inspect(Swarm.status(:mag79)) =~ "idle"
+    eventually(fn -> inspect(Swarm.status(:mag79)) =~ "idle" end)
     assert inspect(Swarm.status(:mag79)) =~ "CRASHED (RuntimeError) boom, " <> place
     assert Enum.any?(Fleet.result(fleet).stages, &(&1.stage == :crashed))
     # An order to this robot alone ends it.
