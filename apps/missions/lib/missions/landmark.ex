@@ -10,7 +10,7 @@ defmodule Missions.Landmark do
   | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
   | `Lookout`, `Coverage` | where it looks next, and what has been looked at |
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
-  | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed |
+  | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed; `.Loss` what it does without the landmark |
   | `Shape` | a shape that there is room for |
   | `SelfReport`, `Claim` | what it claims of itself: to people, and to the others |
   | `Follower` | what a follower does: its slot, its gaze, its child |
@@ -31,6 +31,7 @@ defmodule Missions.Landmark do
   alias Missions.Landmark
   alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Lookout, Policy}
   alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Transitions}
+  alias Missions.Landmark.Leader.Loss
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
   @behaviour Robot.Mission
@@ -103,6 +104,9 @@ defmodule Missions.Landmark do
 
   def handle({:outcome, {:roam, leg}, result}, %{phase: :wander} = mission),
     do: still(Lookout.ended(mission, leg, result))
+
+  def handle({:outcome, tag, result}, %{phase: :lead} = mission),
+    do: still(Loss.ended(mission, tag, result))
 
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
 

@@ -7,8 +7,8 @@ defmodule Missions.Landmark.Leader do
   alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
-  alias Missions.Landmark.Leader.{Announcement, Slots}
+  alias Missions.Landmark.{Claim, Merge, Shape}
+  alias Missions.Landmark.Leader.{Announcement, Loss, Slots}
 
   # A landmark farther off than this is driven after, to `Slots.near/0`.
   @far 1.9
@@ -18,9 +18,8 @@ defmodule Missions.Landmark.Leader do
   # this long.
   @formed_ms 1_000
   @unformed_ms 500
-  # The landmark is lost if it was not seen for this long; a little later the leader looks around.
+  # The landmark is lost if it was not seen for this long; `Loss` tells what the leader does about it.
   @lost_ms 3_000
-  @scan_ms 5_000
   @unheard_ms 1_500
   # For this long a new leader sends its place to all, not only to its child.
   @fresh_ms 500
@@ -32,6 +31,7 @@ defmodule Missions.Landmark.Leader do
             lost?: false,
             no_room?: false,
             heard_ms: nil,
+            loss: %Loss{},
             shape: %Shape{}
 
   @typedoc """
@@ -46,6 +46,7 @@ defmodule Missions.Landmark.Leader do
           lost?: boolean(),
           no_room?: boolean(),
           heard_ms: integer() | nil,
+          loss: Loss.t(),
           shape: Shape.t()
         }
 
@@ -107,7 +108,7 @@ defmodule Missions.Landmark.Leader do
   end
 
   defp lead(mission) do
-    mission = mission |> Slots.update() |> Announcement.update()
+    mission = mission |> Loss.update() |> Slots.update() |> Announcement.update()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
     {mission, no_room} = room(mission)
@@ -224,20 +225,15 @@ defmodule Missions.Landmark.Leader do
     {put_in(mission.leadership.lost?, lost?), stage}
   end
 
-  # A leader that has not seen the landmark for long looks all around for it. A new leader may
-  # have seen it with its camera turned aside, and look ahead now: it turns to where the landmark
+  # A new leader may have seen the landmark with its camera turned aside, and look ahead now: it turns to where the landmark
   # was.
-  defp goal(mission) do
-    if LandmarkTrack.fresh?(mission.sight, mission.now_ms, @scan_ms) or
-         mission.now_ms - mission.since_ms < @scan_ms do
-      {near, far} = range(mission)
-      place = mission.sight && mission.sight.place
-      options = [colour: mission.colour, near: near, far: far, place: place]
-      {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
-    else
-      turn = div(mission.now_ms, 20_000)
-      {:goal, {:seek, mission.epoch, turn}, {Robot.Behaviour.FindBlob, [colour: mission.colour]}}
-    end
+  defp goal(mission), do: Loss.goal(mission) || track(mission)
+
+  defp track(mission) do
+    {near, far} = range(mission)
+    place = mission.sight && mission.sight.place
+    options = [colour: mission.colour, near: near, far: far, place: place]
+    {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
   end
 
   defp range(%{formation: {:circle, _d} = formation, order: order}) do

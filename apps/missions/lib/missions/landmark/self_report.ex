@@ -3,6 +3,7 @@ defmodule Missions.Landmark.SelfReport do
   # Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, Lookout, Marks}
+  alias Missions.Landmark.Leader.Loss
 
   @doc "The claim of this tick."
   @spec claim(Landmark.State.t()) :: map()
@@ -40,6 +41,7 @@ defmodule Missions.Landmark.SelfReport do
     "in its slot, but NOT SURE of its place#{within}"
   end
 
+  defp says(%{phase: :lead} = mission), do: Loss.says(mission)
   defp says(%{phase: phase} = mission) when phase in [:wander, :rest], do: Lookout.says(mission)
   defp says(_mission), do: nil
 

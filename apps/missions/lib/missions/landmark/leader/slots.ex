@@ -3,6 +3,7 @@ defmodule Missions.Landmark.Leader.Slots do
   # Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Merge, Rounds, Shape}
+  alias Missions.Landmark.Leader.Loss
   alias Swarm.Formation.{Assignment, Chain}
 
   # Metres: nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
@@ -16,7 +17,12 @@ defmodule Missions.Landmark.Leader.Slots do
 
   @doc "One tick: who has left and who has come, and a shape that there is room for."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
-  def update(mission), do: mission |> muster() |> shape()
+  def update(mission) do
+    case Loss.kept(mission, Rounds.view(mission)) do
+      nil -> mission |> muster() |> shape()
+      kept -> %{mission | order: Enum.map(kept, &elem(&1, 0))}
+    end
+  end
 
   # Robots that are gone leave their slots and those behind move up (R53 with healing); new ones
   # join the tail.
