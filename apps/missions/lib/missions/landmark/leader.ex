@@ -3,6 +3,7 @@ defmodule Missions.Landmark.Leader do
   # Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
   # (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
   # judges whether the shape is formed. Pure.
+  alias Hal.Pose
   alias Robot.Localiser.Anchors
   alias Swarm.Formation
   alias Swarm.Membership.NameSet
@@ -18,6 +19,10 @@ defmodule Missions.Landmark.Leader do
   # this long.
   @formed_ms 1_000
   @unformed_ms 500
+  # People are told again that a shape is formed if it was not for this long, or if the leader has moved by so much (metres,
+  # radians), or the shape or its robots have changed: not of each time that a robot at the edge of its place moves.
+  @again_ms 20_000
+  @moved 0.3
   # The landmark is lost if it was not seen for this long; `Loss` tells what the leader does about it.
   @lost_ms 3_000
   @unheard_ms 1_500
@@ -28,6 +33,8 @@ defmodule Missions.Landmark.Leader do
             good_ms: nil,
             bad_ms: nil,
             formed?: false,
+            told: nil,
+            unformed_ms: 0,
             lost?: false,
             no_room?: false,
             heard_ms: nil,
@@ -36,13 +43,16 @@ defmodule Missions.Landmark.Leader do
 
   @typedoc """
   `sequence` numbers the anchors; the shape has been right since `good_ms`, or wrong since
-  `bad_ms`; `heard_ms` is when somebody was last known to hear this leader.
+  `bad_ms`; it is not formed since `unformed_ms`, and people were `told` of where the leader stood in which shape when it was;
+  `heard_ms` is when somebody was last known to hear this leader.
   """
   @type t :: %__MODULE__{
           sequence: non_neg_integer(),
           good_ms: integer() | nil,
           bad_ms: integer() | nil,
           formed?: boolean(),
+          told: {Pose.t(), shape :: term()} | nil,
+          unformed_ms: integer(),
           lost?: boolean(),
           no_room?: boolean(),
           heard_ms: integer() | nil,
@@ -73,6 +83,7 @@ defmodule Missions.Landmark.Leader do
     leadership = %{
       mission.leadership
       | formed?: false,
+        told: nil,
         good_ms: nil,
         bad_ms: nil,
         shape: Shape.new()
@@ -174,16 +185,32 @@ defmodule Missions.Landmark.Leader do
 
     cond do
       not leadership.formed? and good? and now - leadership.good_ms >= @formed_ms ->
-        {%{mission | leadership: %{leadership | formed?: true}},
-         [{:stage, :formed, formed(mission)}]}
+        tell(%{mission | leadership: %{leadership | formed?: true}})
 
       leadership.formed? and not good? and now - leadership.bad_ms >= @unformed_ms ->
-        {%{mission | leadership: %{leadership | formed?: false}}, []}
+        {%{mission | leadership: %{leadership | formed?: false, unformed_ms: now}}, []}
 
       true ->
         {%{mission | leadership: leadership}, []}
     end
   end
+
+  defp tell(%{leadership: leadership, percept: %{pose: pose}} = mission) do
+    shape = {mission.order, mission.asked_no, leadership.shape.formation, leadership.shape.spots}
+
+    if news?(leadership, pose, shape, mission.now_ms),
+      do: {put_in(mission.leadership.told, {pose, shape}), [{:stage, :formed, formed(mission)}]},
+      else: {mission, []}
+  end
+
+  defp news?(%{told: {then, shape}} = leadership, pose, shape, now) do
+    turned = abs(Pose.wrap(pose.heading - then.heading))
+
+    now - leadership.unformed_ms >= @again_ms or Pose.distance(then, pose) > @moved or
+      turned > @moved
+  end
+
+  defp news?(_other, _pose, _shape, _now), do: true
 
   # If there was no room for the shape that was asked for, which one it is instead.
   defp formed(%{leadership: %{shape: %{rung: rung}}} = mission) do
@@ -222,7 +249,8 @@ defmodule Missions.Landmark.Leader do
         do: [{:stage, :lost, %{epoch: mission.epoch}}],
         else: []
 
-    {put_in(mission.leadership.lost?, lost?), stage}
+    told = if lost?, do: nil, else: mission.leadership.told
+    {%{mission | leadership: %{mission.leadership | lost?: lost?, told: told}}, stage}
   end
 
   # A new leader may have seen the landmark with its camera turned aside, and look ahead now: it turns to where the landmark
