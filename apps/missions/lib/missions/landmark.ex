@@ -69,7 +69,7 @@ defmodule Missions.Landmark do
   def messages, do: {1, round: :shared, claim: :shared, looked: Lookout.message()}
 
   @impl Robot.Mission
-  def claims, do: {2, Landmark.Claim}
+  def claims, do: {3, Landmark.Claim}
 
   @impl Robot.Mission
   defdelegate stale(claim), to: Landmark.Claim
@@ -124,6 +124,7 @@ defmodule Missions.Landmark do
       awake
       | percept: percept,
         now_ms: percept.at_ms,
+        pictured_ms: pictured_ms(mission, percept),
         sight: LandmarkTrack.update(mission.sight, percept, mission.colour),
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
@@ -149,6 +150,9 @@ defmodule Missions.Landmark do
     effects = letters ++ beats ++ stages ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, SelfReport.claim(mission)}]}
   end
+
+  defp pictured_ms(%{pictured_ms: ms}, %{detections: nil, at_ms: at_ms}), do: ms || at_ms
+  defp pictured_ms(_mission, %{at_ms: at_ms}), do: at_ms
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until
   # it leads for the first time, nobody has taken its places from it.

@@ -4,7 +4,7 @@ defmodule Missions.Landmark.Claim do
 
   `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
   estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside
-  it. `in_place` says that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
+  it. `blind` says that its camera has given no picture for long, `in_place` that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
   does not get there, `formed` that all do. Only a leader has an `anchor`.
   """
   alias Missions.Landmark.Reference
@@ -19,6 +19,7 @@ defmodule Missions.Landmark.Claim do
             sd: nil,
             in_place: false,
             unsure: false,
+            blind: false,
             blocked: false,
             formed: false,
             anchor: nil
@@ -30,6 +31,7 @@ defmodule Missions.Landmark.Claim do
           sd: spread() | nil,
           in_place: boolean(),
           unsure: boolean(),
+          blind: boolean(),
           blocked: boolean(),
           formed: boolean(),
           anchor: Reference.t() | nil
@@ -55,7 +57,10 @@ defmodule Missions.Landmark.Claim do
   @spec valid?(t()) :: boolean()
   def valid?(%__MODULE__{} = claim) do
     Wire.counter?(claim.epoch) and sight?(claim.sight) and spread?(claim.sd) and
-      Enum.all?([claim.in_place, claim.unsure, claim.blocked, claim.formed], &is_boolean/1) and
+      Enum.all?(
+        [claim.in_place, claim.unsure, claim.blind, claim.blocked, claim.formed],
+        &is_boolean/1
+      ) and
       (claim.anchor == nil or Reference.valid?(claim.anchor))
   end
 

@@ -2,7 +2,7 @@ defmodule Missions.Landmark.SelfReport do
   @moduledoc false
   # Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   alias Missions.Landmark
-  alias Missions.Landmark.{Blocker, Lookout, Marks}
+  alias Missions.Landmark.{Blocker, LandmarkTrack, Lookout, Marks}
   alias Missions.Landmark.Leader.Loss
 
   @doc "The claim of this tick."
@@ -26,6 +26,7 @@ defmodule Missions.Landmark.SelfReport do
       uncertainty: uncertainty(mission.percept),
       in_place: mission.phase == :follow and mission.follower.in_place?,
       unsure: mission.phase == :follow and mission.follower.unsure?,
+      blind: LandmarkTrack.blind?(mission.pictured_ms, mission.now_ms),
       blocked: mission.phase == :follow and mission.follower.progress.blocked?,
       says: says(mission),
       blocked_by:
