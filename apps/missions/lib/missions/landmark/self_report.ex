@@ -3,6 +3,7 @@ defmodule Missions.Landmark.SelfReport do
   # Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   alias Missions.Landmark
   alias Missions.Landmark.{Blocker, LandmarkTrack, Lookout, Marks}
+  alias Missions.Landmark.Follower.Guide
   alias Missions.Landmark.Leader.Loss
 
   @doc "The claim of this tick."
@@ -31,6 +32,7 @@ defmodule Missions.Landmark.SelfReport do
       says: says(mission),
       blocked_by:
         if(mission.phase == :follow, do: Blocker.words(mission.follower.progress.blocker)),
+      sees: Guide.sees(mission),
       formed: leading? and mission.leadership.formed?,
       anchor: if(leading?, do: mission.anchor)
     }
