@@ -4,6 +4,7 @@
   robots: 3,
   landmark: :none,
   duration_s: 150,
+  plan: :none,
   script: [
     {60, {:move, {-3.4, -1.2}}}
   ],

@@ -13,6 +13,9 @@ defmodule Console.Demo do
 
   @progress_ms 100
 
+  # A fleet of more robots may be too large for real time.
+  @large 20
+
   @doc """
   Runs `options` with `Sim.Trial`, or `Sim.Fleet` in real time, and returns the exit status: 0 if the fleet
   ended in formation, 2 if it did not, 1 if the run cannot be made, or ended before its time. Among
@@ -51,6 +54,7 @@ defmodule Console.Demo do
               told: 0,
               starts: for(robot <- scene.robots, do: Pose.point(robot.pose)),
               drawn_ms: started,
+              pace: {0, started, trial_module == Trial and length(scene.robots) > @large},
               output: output,
               duration_s: Options.duration_s(options)
             },
@@ -69,9 +73,9 @@ defmodule Console.Demo do
   end
 
   # What the machine does not manage in real time: the second of two steps of a large fleet in lockstep is timed. They are
-  # made again in the run.
-  @large 20
+  # made again in the run. Robots that hear and see each other take longer than they do then, so it is timed on.
   @step_us 100_000
+  @paced_ms 10_000
 
   defp slow(Trial, trial) do
     trial = if length(Trial.living(trial)) > @large, do: Trial.step(trial)
@@ -175,10 +179,42 @@ defmodule Console.Demo do
       before = run.trial
       trial = step(run.module, before)
       scene = run.module.scene(trial)
-      {trial, run} = record(run, before, trial, scene)
+      {trial, run} = run |> paced(scene) |> record(before, trial, scene)
       play(%{run | trial: trial, track: run.track && RunTrack.add(run.track, scene)}, scene)
     end
   end
+
+  defp paced(run, scene) do
+    {pace, line} = pace(run.pace, scene.at_ms, Hal.Clock.now_ms())
+    if line, do: Output.line(run.output, line)
+    %{run | pace: pace}
+  end
+
+  @doc """
+  How fast a run goes, at this simulated time and this time of the clock (ms): since when it was not looked at, and the line
+  that says so, once, after 10 simulated seconds that took longer than that; else `nil`.
+
+      iex> pace = {0, 500, true}
+      iex> {pace, nil} = Console.Demo.pace(pace, 9_900, 100_000)
+      iex> {later, nil} = Console.Demo.pace(pace, 10_000, 10_400)
+      iex> Console.Demo.pace(later, 20_000, 35_400)
+      {{20_000, 35_400, false}, "From 10 to 20 s the run went at 0.40 times real time here"}
+  """
+  @spec pace(pace, integer(), integer()) :: {pace, String.t() | nil}
+        when pace: {at_ms :: integer(), clock_ms :: integer(), tells? :: boolean()}
+  def pace({from_ms, started_ms, true}, at_ms, now_ms) when at_ms - from_ms >= @paced_ms do
+    {simulated, real} = {at_ms - from_ms, max(now_ms - started_ms, 1)}
+
+    if real > simulated do
+      span = "From #{div(from_ms, 1_000)} to #{div(at_ms, 1_000)} s"
+      speed = Format.decimals(simulated / real, 2)
+      {{at_ms, now_ms, false}, "#{span} the run went at #{speed} times real time here"}
+    else
+      {{at_ms, now_ms, true}, nil}
+    end
+  end
+
+  def pace(pace, _at_ms, _now_ms), do: {pace, nil}
 
   # Robots in real time go by themselves.
   defp step(Sim.Fleet, fleet) do

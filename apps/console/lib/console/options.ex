@@ -127,8 +127,7 @@ defmodule Console.Options do
   @spec real_time?(t()) :: boolean()
   def real_time?(%__MODULE__{nodes: nodes?, hardware: hardware}), do: nodes? or hardware != []
 
-  # Whoever makes a map does not have it.
-  defp plan(%{plan: nil, mission: mission}), do: if(maps?(mission), do: :none, else: :known)
+  defp plan(%{plan: nil, mission: mission}), do: Sim.Trial.Options.plan(mission)
   defp plan(%{plan: plan}), do: plan
 
   @doc """

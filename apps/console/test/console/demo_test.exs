@@ -3,6 +3,7 @@ defmodule Console.DemoTest do
   use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.{Demo, FakeTrial, Runs}
+  doctest Demo
 
   defp demo(line, words \\ []) do
     {status, text} = with_io(fn -> Demo.run(Runs.options(line, words), FakeTrial) end)

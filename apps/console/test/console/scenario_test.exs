@@ -111,7 +111,7 @@ defmodule Console.ScenarioTest do
 
     nowhere = file(folder, "d.exs", "[map: \"mars\"]")
     assert {{:shutdown, 1}, told} = task.([nowhere])
-    assert told =~ "scenario: #{nowhere}: map: expected"
+    assert told =~ "scenario: #{nowhere}:1: map: expected"
     assert {{:shutdown, 1}, told} = task.([])
     assert told =~ "a file is missing"
     assert {{:shutdown, 1}, told} = task.(["--quite"])

@@ -10,10 +10,10 @@ defmodule Missions.Landmark do
   | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
   | `Lookout`, `Coverage` | where it looks next, and what has been looked at |
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
-  | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed |
+  | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed; `.Loss` what it does without the landmark |
   | `Shape` | a shape that there is room for |
   | `SelfReport`, `Claim` | what it claims of itself: to people, and to the others |
-  | `Follower` | what a follower does: its slot, its gaze, its child |
+  | `Follower` | what a follower does: its slot, its gaze, its child; `.Guide` tells one without pictures where it stands |
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
@@ -31,6 +31,7 @@ defmodule Missions.Landmark do
   alias Missions.Landmark
   alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Lookout, Policy}
   alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Transitions}
+  alias Missions.Landmark.Leader.Loss
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
   @behaviour Robot.Mission
@@ -68,7 +69,7 @@ defmodule Missions.Landmark do
   def messages, do: {1, round: :shared, claim: :shared, looked: Lookout.message()}
 
   @impl Robot.Mission
-  def claims, do: {2, Landmark.Claim}
+  def claims, do: {3, Landmark.Claim}
 
   @impl Robot.Mission
   defdelegate stale(claim), to: Landmark.Claim
@@ -104,6 +105,9 @@ defmodule Missions.Landmark do
   def handle({:outcome, {:roam, leg}, result}, %{phase: :wander} = mission),
     do: still(Lookout.ended(mission, leg, result))
 
+  def handle({:outcome, tag, result}, %{phase: :lead} = mission),
+    do: still(Loss.ended(mission, tag, result))
+
   def handle({:outcome, _tag, _result}, mission), do: still(mission)
 
   def handle({:message, %{kind: :looked, from: from, body: body}}, mission) when is_list(body),
@@ -120,6 +124,7 @@ defmodule Missions.Landmark do
       awake
       | percept: percept,
         now_ms: percept.at_ms,
+        pictured_ms: pictured_ms(mission, percept),
         sight: LandmarkTrack.update(mission.sight, percept, mission.colour),
         trail: if(percept.pose, do: Trail.note(mission.trail, percept.pose), else: mission.trail)
     }
@@ -145,6 +150,9 @@ defmodule Missions.Landmark do
     effects = letters ++ beats ++ stages ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, SelfReport.claim(mission)}]}
   end
+
+  defp pictured_ms(%{pictured_ms: ms}, %{detections: nil, at_ms: at_ms}), do: ms || at_ms
+  defp pictured_ms(_mission, %{at_ms: at_ms}), do: at_ms
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until
   # it leads for the first time, nobody has taken its places from it.

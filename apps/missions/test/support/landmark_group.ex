@@ -105,8 +105,8 @@ defmodule Missions.Landmark.Group do
     end
   end
 
-  @doc "Sets how much of a robot's picture the landmark fills from now on."
-  @spec show(t(), atom(), float() | nil) :: t()
+  @doc "Sets how much of a robot's picture the landmark fills from now on; `:dark`: there are no pictures."
+  @spec show(t(), atom(), float() | nil | :dark) :: t()
   def show(group, id, share), do: put_in(group.robots[id].share, share)
 
   @doc """
@@ -189,13 +189,14 @@ defmodule Missions.Landmark.Group do
       },
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
       peers: Peers.percepts(robot.peers, group.now),
-      detections: %Vision.Detections{
-        at_ms: group.now,
-        blobs: blobs(robot.share),
-        pose: robot.pose
-      }
+      detections: detections(group, robot)
     }
   end
+
+  defp detections(_group, %{share: :dark}), do: nil
+
+  defp detections(group, robot),
+    do: %Vision.Detections{at_ms: group.now, blobs: blobs(robot.share), pose: robot.pose}
 
   defp blobs(nil), do: []
 
@@ -259,7 +260,7 @@ defmodule Missions.Landmark.Group do
       %{goal: {{:search, _} = tag, _}, goal_ms: since} = robot
       when group.now - since >= @scan_ms ->
         group = put_in(group.robots[id].goal, {:over, tag})
-        event(group, id, {:outcome, tag, if(robot.share, do: 1, else: 0)})
+        event(group, id, {:outcome, tag, if(is_number(robot.share), do: 1, else: 0)})
 
       %{goal: {_tag, {Robot.Behaviour.Follow, options}}, pose: pose} = robot ->
         put_in(group.robots[id], %{robot | pose: toward(pose, options[:target])})

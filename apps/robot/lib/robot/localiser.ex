@@ -28,6 +28,9 @@ defmodule Robot.Localiser do
   # A robot that was started again on its way has found its place when it knows it by this (m).
   @found_radius 1.0
 
+  # A robot that is told where it stands believes that if it knows its place less by this factor.
+  @less_sure 1.5
+
   @enforce_keys [:start]
   defstruct @enforce_keys ++
               [
@@ -160,11 +163,23 @@ defmodule Robot.Localiser do
       |> remember(percept.at_ms)
       |> see(percept)
       |> hear(percept)
+      |> told()
       |> found()
 
     percept = exposed(percept, localiser)
     {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
   end
+
+  # The same error is in all that is told, so it counts only for a robot that knows less.
+  defp told(%{anchors: %{told: %{at: at, sd: sd}}, belief: belief} = localiser) do
+    {worst, _least, _heading} = Belief.sd(belief)
+
+    if worst > @less_sure * sd,
+      do: %{localiser | belief: Belief.placed(belief, at, sd)},
+      else: localiser
+  end
+
+  defp told(localiser), do: localiser
 
   defp found(%{lost?: false} = localiser), do: localiser
 

@@ -222,8 +222,10 @@ defmodule Sim.Fleet do
     if id in ask(s, :living), do: note({:killed, id}, become(s, :kill, [id])), else: s
   end
 
-  defp play({:move, place}, s),
-    do: note({:stage, :landmark_moved, nil, %{}}, become(s, :change, [{:move, place}]))
+  defp play({:move, place}, s) do
+    stage = if place, do: :landmark_moved, else: :landmark_removed
+    note({:stage, stage, nil, %{}}, become(s, :change, [{:move, place}]))
+  end
 
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 

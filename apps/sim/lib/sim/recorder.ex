@@ -5,9 +5,11 @@ defmodule Sim.Recorder do
   readable even if the program is killed then.
 
   The run's times count from zero, so that a run from a seed gives the same file. A write that
-  fails ends the recording, not the run; an ffmpeg that fails ends the pictures; `close/1` says so.
+  fails ends the recording, not the run, and what was written before stays whole; an ffmpeg that fails ends the pictures;
+  `close/1` says so.
   """
   use GenServer
+  alias Mcap.FileWriter.{Disk, Output}
   alias Mcap.Writer
   alias Hal.Frame
   alias Sim.Recorder.Camera
@@ -32,18 +34,13 @@ defmodule Sim.Recorder do
 
     # Whether it can be opened is known before there is a process that would end for it.
     with :ok <- if(pictures?, do: able(path), else: :ok),
-         :ok <- explain(path, File.write(path, "")),
+         :ok <- Disk.named(File.write(path, ""), path),
          do: GenServer.start_link(__MODULE__, {path, setup, pictures?}, spawn_opt: @room)
   end
 
   defp able(path) do
     with {:error, line} <- Camera.able(), do: {:error, "#{path} would have no pictures: #{line}"}
   end
-
-  defp explain(_path, :ok), do: :ok
-
-  defp explain(path, {:error, reason}),
-    do: {:error, "#{path} cannot be written: #{:file.format_error(reason)}"}
 
   @doc """
   Records a tick, the scene at its end, and the pictures that were due at its begin
@@ -71,34 +68,37 @@ defmodule Sim.Recorder do
   def init({path, setup, pictures?}) do
     # So that the end of an ffmpeg is a message.
     if pictures?, do: Process.flag(:trap_exit, true)
-    {:ok, file} = :file.open(path, [:write, :raw, :binary])
-    {writer, head} = Writer.new(library: "convoy")
-    {writer, note} = Writer.metadata(writer, "convoy", Recording.metadata(setup))
-    {topics, writer, first} = Topics.open(writer, setup, pictures?)
 
     s = %{
       path: path,
-      file: file,
+      output: nil,
       written: :ok,
-      writer: writer,
-      topics: topics,
+      topics: nil,
       flushed_ms: 0,
       camera: nil,
       blind: nil
     }
 
-    # The start is on the disk before anything happens.
-    {:ok, s |> write([head, note, first]) |> flush(0)}
+    case Output.open(path, nil, library: "convoy", overwrite: true) do
+      {:ok, output} -> {:ok, begin(%{s | output: output}, setup, pictures?)}
+      {:error, line} -> {:ok, %{s | written: {:error, line}}}
+    end
+  end
+
+  # The start is on the disk before anything happens.
+  defp begin(s, setup, pictures?) do
+    {writer, note} = Writer.metadata(s.output.writer, "convoy", Recording.metadata(setup))
+    {topics, writer, first} = Topics.open(writer, setup, pictures?)
+    %{s | topics: topics} |> write(writer, [note, first]) |> flush(0)
   end
 
   @impl GenServer
   def handle_call(:reached, _from, s), do: {:reply, :ok, s}
 
   def handle_call(:close, _from, s) do
-    s = write(s, Writer.finish(s.writer))
-    :ok = :file.close(s.file)
+    s = took(s, s.output && Output.finish(s.output))
     :ok = Camera.close(s.camera)
-    {:reply, with(:ok <- explain(s.path, s.written), do: s.blind || :ok), %{s | camera: nil}}
+    {:reply, with(:ok <- s.written, do: s.blind || :ok), %{s | output: nil, camera: nil}}
   end
 
   @impl GenServer
@@ -107,8 +107,8 @@ defmodule Sim.Recorder do
 
   def handle_cast({:tick, {at_ms, _bytes, _facts} = tick, scene, frames}, s) do
     {pictures, s} = Enum.flat_map_reduce(frames, s, &picture/2)
-    {topics, writer, bytes} = Topics.tick(s.topics, s.writer, tick, scene, pictures)
-    s = write(%{s | topics: topics, writer: writer}, bytes)
+    {topics, writer, bytes} = Topics.tick(s.topics, s.output.writer, tick, scene, pictures)
+    s = write(%{s | topics: topics}, writer, bytes)
     {:noreply, if(at_ms - s.flushed_ms >= @chunk_ms, do: flush(s, at_ms), else: s)}
   end
 
@@ -128,13 +128,12 @@ defmodule Sim.Recorder do
     end
   end
 
-  defp flush(s, at_ms) do
-    {writer, bytes} = Writer.flush(s.writer)
-    write(%{s | writer: writer, flushed_ms: at_ms}, bytes)
-  end
+  defp flush(%{output: nil} = s, _at_ms), do: s
+  defp flush(s, at_ms), do: took(%{s | flushed_ms: at_ms}, Output.flush(s.output))
 
-  defp write(%{written: :ok} = s, bytes),
-    do: if(bytes == [], do: s, else: %{s | written: :file.write(s.file, bytes)})
+  defp write(s, writer, bytes), do: took(s, Output.write(s.output, writer, bytes))
 
-  defp write(s, _bytes), do: s
+  defp took(s, nil), do: s
+  defp took(s, {:ok, output}), do: %{s | output: output}
+  defp took(s, {:error, _line} = error), do: %{s | output: nil, written: error}
 end

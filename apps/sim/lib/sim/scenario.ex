@@ -93,11 +93,21 @@ defmodule Sim.Scenario do
   """
   @spec problems(keyword()) :: [Type.problem()]
   def problems(values) do
-    %{robots: robots, duration_s: duration_s} = Map.merge(defaults(), Map.new(values))
+    %{robots: robots, duration_s: duration_s} = given = Map.merge(defaults(), Map.new(values))
     script = Keyword.get(values, :script, [])
 
-    Event.problems(script, robots) ++
+    options(given) ++
+      Event.problems(script, robots) ++
       late(script, duration_s) ++ expected(Keyword.get(values, :expect, []), robots, duration_s)
+  end
+
+  defp options(given) do
+    Trial.Options.problems(given) ++
+      for(
+        _id <- Enum.take(given.hardware, 1),
+        do:
+          {["hardware"], "no run in lockstep has hardware: serial lines have a time of their own"}
+      )
   end
 
   defp defaults, do: Map.new(Options.defaults(Trial.Options.table()))
@@ -138,8 +148,10 @@ defmodule Sim.Scenario do
 
   @doc "The options for `Sim.Trial.new/1`."
   @spec trial(t()) :: map()
-  def trial(%__MODULE__{} = scenario),
-    do: scenario.options |> Map.new() |> Map.put(:script, scenario.script)
+  def trial(%__MODULE__{options: options, script: script}) do
+    plan = Trial.Options.plan(options[:mission])
+    options |> Map.new() |> Map.put(:script, script) |> Map.put_new(:plan, plan)
+  end
 
   @doc "How long the run may take, in simulated seconds."
   @spec duration_s(t()) :: number()

@@ -220,6 +220,7 @@ defmodule Sim.FleetTest do
     assert Fleet.move_landmark(fleet, {99.0, 0.0}) |> elem(1) =~ "99"
     assert Fleet.move_landmark(fleet, nil) == :ok
     assert Fleet.scene(fleet).landmark == nil
+    assert List.last(stages(fleet)) == :landmark_removed
     stop(fleet)
   end
 

@@ -21,13 +21,15 @@ defmodule Console.Cli.Format do
       "    3.0 s  crashed         mag1: (RuntimeError) boom, lib/gather.ex:42"
       iex> Console.Cli.Format.stage(%{stage: :search, at_s: 0.0})
       "    0.0 s  search          every robot looks around for the landmark"
+      iex> Console.Cli.Format.stage(%{stage: :landmark_removed, at_s: 35.0, robot: nil})
+      "   35.0 s  landmark_removed  the landmark is taken away"
   """
   @spec stage(Sim.Scene.stage()) :: String.t()
   def stage(%{clock: clock, line: line}), do: "#{clock}  #{line}"
 
   def stage(%{stage: name, at_s: at_s} = stage) do
     String.pad_leading(decimals(at_s, 1), 7) <>
-      " s  " <> String.pad_trailing(to_string(name), 16) <> meaning(stage)
+      " s  " <> String.pad_trailing("#{name}", 14) <> "  " <> meaning(stage)
   end
 
   @doc """

@@ -3,9 +3,13 @@ defmodule Mcap.FileWriter.Disk do
 
   @type result :: :ok | {:error, line :: String.t()}
 
-  @doc "Makes a file. One that is there already is not touched."
-  @spec create(Path.t()) :: {:ok, :file.io_device()} | {:error, line :: String.t()}
-  def create(path), do: named(:file.open(path, [:write, :exclusive, :raw, :binary]), path)
+  @doc "Makes a file. One that is there already is not touched, or emptied if that is wanted."
+  @spec create(Path.t(), overwrite? :: boolean()) ::
+          {:ok, :file.io_device()} | {:error, line :: String.t()}
+  def create(path, overwrite? \\ false) do
+    modes = if overwrite?, do: [:write, :raw, :binary], else: [:write, :exclusive, :raw, :binary]
+    named(:file.open(path, modes), path)
+  end
 
   @doc "Writes all of this at the end of a file, which has `from` bytes, or nothing of it."
   @spec append(:file.io_device(), Path.t(), iodata(), from :: non_neg_integer()) :: result()

@@ -1,7 +1,10 @@
 defmodule Mcap.FileWriter.Output do
-  @moduledoc false
-  # Writes to a file; or, with a limit, to a folder of numbered files. All functions return the error as one line; the
-  # file then ends with the last chunk that was written whole, finished if that is still possible.
+  @moduledoc """
+  Writes to a file; or, with a limit, to a folder of numbered files. All functions return the error as one line; the
+  file then ends with the last chunk that was written whole, finished if that is still possible.
+
+  `Mcap.FileWriter` is the process around it. Who has one already calls it from there.
+  """
   alias Mcap.FileWriter.{Disk, Folder}
   alias Mcap.Writer
 
@@ -26,10 +29,15 @@ defmodule Mcap.FileWriter.Output do
   @message 4
   @notes 64
 
-  @doc "Opens the file, or the next one of the folder. A file that is there already is not touched."
+  @doc """
+  Opens the file, or the next one of the folder. A file that is there already is not touched; with `overwrite: true` it is
+  emptied. The other options are those of `Mcap.Writer.new/1`.
+  """
   @spec open(Path.t(), pos_integer() | nil, keyword()) :: result()
   def open(path, nil, options) do
-    with {:ok, file} <- Disk.create(path) do
+    {overwrite?, options} = Keyword.pop(options, :overwrite, false)
+
+    with {:ok, file} <- Disk.create(path, overwrite?) do
       {writer, head} = Writer.new(options)
       write(%__MODULE__{path: path, file: file, writer: writer}, writer, head, 0)
     end
@@ -115,7 +123,10 @@ defmodule Mcap.FileWriter.Output do
     end
   end
 
-  defp write(t, writer, iodata, from \\ nil)
+  @doc "Writes what calls of `Mcap.Writer` returned, beginning with the writer in `writer` of this, and keeps that which they left."
+  @spec write(t(), Writer.t(), iodata()) :: result()
+  def write(t, writer, iodata), do: write(t, writer, iodata, nil)
+
   defp write(t, writer, [], _from), do: {:ok, %{t | writer: writer}}
 
   defp write(t, writer, iodata, from) do

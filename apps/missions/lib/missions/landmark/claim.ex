@@ -4,8 +4,8 @@ defmodule Missions.Landmark.Claim do
 
   `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
   estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside
-  it. `in_place` says that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
-  does not get there, `formed` that all do. Only a leader has an `anchor`.
+  it. `blind` says that its camera has given no picture for long, `in_place` that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
+  does not get there, `formed` that all do. `sees` is a robot without pictures that it sees, and where. Only a leader has an `anchor`.
   """
   alias Missions.Landmark.Reference
   alias Swarm.Membership.Heartbeat
@@ -14,13 +14,18 @@ defmodule Missions.Landmark.Claim do
   @typedoc "Standard deviations of a place in mm, along the worst direction and across it, and that direction in mrad."
   @type spread :: {worst :: non_neg_integer(), least :: non_neg_integer(), direction :: integer()}
 
+  @typedoc "Where a robot sees another one: in mm, in the leader's frame, with the standard deviation of that place in mm."
+  @type seen :: {atom(), {x_mm :: integer(), y_mm :: integer()}, sd_mm :: non_neg_integer()}
+
   defstruct epoch: 0,
             sight: nil,
             sd: nil,
             in_place: false,
             unsure: false,
+            blind: false,
             blocked: false,
             formed: false,
+            sees: nil,
             anchor: nil
 
   @typedoc "What heartbeats carry."
@@ -30,8 +35,10 @@ defmodule Missions.Landmark.Claim do
           sd: spread() | nil,
           in_place: boolean(),
           unsure: boolean(),
+          blind: boolean(),
           blocked: boolean(),
           formed: boolean(),
+          sees: seen() | nil,
           anchor: Reference.t() | nil
         }
 
@@ -55,8 +62,11 @@ defmodule Missions.Landmark.Claim do
   @spec valid?(t()) :: boolean()
   def valid?(%__MODULE__{} = claim) do
     Wire.counter?(claim.epoch) and sight?(claim.sight) and spread?(claim.sd) and
-      Enum.all?([claim.in_place, claim.unsure, claim.blocked, claim.formed], &is_boolean/1) and
-      (claim.anchor == nil or Reference.valid?(claim.anchor))
+      Enum.all?(
+        [claim.in_place, claim.unsure, claim.blind, claim.blocked, claim.formed],
+        &is_boolean/1
+      ) and
+      seen?(claim.sees) and (claim.anchor == nil or Reference.valid?(claim.anchor))
   end
 
   defp spread?(nil), do: true
@@ -65,6 +75,13 @@ defmodule Missions.Landmark.Claim do
     do: worst in 0..100_000 and least in 0..100_000 and direction in -4_000..4_000
 
   defp spread?(_other), do: false
+
+  defp seen?(nil), do: true
+
+  defp seen?({id, {x, y}, sd}),
+    do: Wire.name?(id) and Wire.number?(x) and Wire.number?(y) and sd in 0..100_000
+
+  defp seen?(_other), do: false
 
   defp sight?(nil), do: true
 

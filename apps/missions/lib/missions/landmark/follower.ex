@@ -10,7 +10,7 @@ defmodule Missions.Landmark.Follower do
   # to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
   alias Hal.Pose
   alias Missions.Landmark
-  alias Missions.Landmark.Follower.{Facing, Progress}
+  alias Missions.Landmark.Follower.{Facing, Guide, Progress}
   alias Missions.Landmark.{Marks, SlotPoses}
   alias Robot.Percept.CameraPointing
   alias Swarm.Formation.Chain
@@ -28,7 +28,8 @@ defmodule Missions.Landmark.Follower do
             told: {0, 0},
             landmark: nil,
             progress: %Progress{},
-            facing: %Facing{}
+            facing: %Facing{},
+            guide: %Guide{}
 
   @typedoc """
   `told` is the epoch and sequence number of the anchor that was last passed on, `landmark` is
@@ -41,7 +42,8 @@ defmodule Missions.Landmark.Follower do
           told: {non_neg_integer(), non_neg_integer()},
           landmark: {integer(), integer()} | nil,
           progress: Progress.t(),
-          facing: Facing.t()
+          facing: Facing.t(),
+          guide: Guide.t()
         }
 
   @doc "The state of a robot that does not follow anybody yet."
@@ -99,11 +101,12 @@ defmodule Missions.Landmark.Follower do
         # follow.
         landmark: landmark(mission, there?),
         progress: Progress.note(follower.progress, mission, slot, error, there?),
+        guide: Guide.note(follower.guide, mission, there? and sure?),
         facing: Facing.note(follower.facing, mission, slot, where(error, there?, sure?), leader)
     }
 
     options = [
-      target: Facing.turned(follower.facing, slot),
+      target: target(follower, mission, slot, leader),
       velocity: velocity,
       discs: SlotPoses.discs(mission.anchor)
     ]
@@ -112,6 +115,11 @@ defmodule Missions.Landmark.Follower do
     mission = %{mission | place: slot, follower: follower}
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
+  end
+
+  defp target(%{facing: facing, guide: guide}, mission, slot, leader) do
+    ahead = SlotPoses.landmark(mission.anchor) || Pose.point(leader)
+    Guide.turned(guide, mission, Facing.turned(facing, slot), ahead)
   end
 
   defp where(_error, true, sure?), do: if(sure?, do: :in_place, else: :unsure)
@@ -134,13 +142,18 @@ defmodule Missions.Landmark.Follower do
   defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
     {leader, _twist} = SlotPoses.leader(anchor, age_ms)
     targets = [SlotPoses.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
-    turn = rem(div(mission.now_ms, @gaze_ms), 2)
-    {first, [second]} = List.pop_at(targets, turn)
+    turn = div(mission.now_ms, @gaze_ms)
+    {first, [second]} = List.pop_at(targets, rem(turn, 2))
+    guided = rem(turn, 4) > 1 && Guide.bearing(mission.follower.guide, mission)
 
-    Enum.find_value([first, second], 0.0, fn place ->
-      bearing = Pose.bearing(percept.pose, place)
-      if CameraPointing.within?(bearing, percept), do: CameraPointing.pan(bearing, percept)
-    end)
+    if guided do
+      CameraPointing.pan(guided, percept)
+    else
+      Enum.find_value([first, second], 0.0, fn place ->
+        bearing = Pose.bearing(percept.pose, place)
+        if CameraPointing.within?(bearing, percept), do: CameraPointing.pan(bearing, percept)
+      end)
+    end
   end
 
   # The last known place of the landmark.

@@ -25,6 +25,9 @@ defmodule Missions.Landmark.LandmarkTrack do
   @jump 0.6
   @moving 0.1
 
+  # Without a picture for so long a robot counts as one without a camera, however short its pictures stop otherwise.
+  @blind_ms 5_000
+
   # An upright pole, in metres.
   @radius 0.15
 
@@ -89,6 +92,11 @@ defmodule Missions.Landmark.LandmarkTrack do
   @spec fresh?(t() | nil, integer(), pos_integer()) :: boolean()
   def fresh?(nil, _now_ms, _ms), do: false
   def fresh?(%{at_ms: at_ms}, now_ms, ms), do: now_ms - at_ms <= ms
+
+  @doc "Whether a robot that had its last picture then has had none for so long that nobody should count on its camera."
+  @spec blind?(pictured_ms :: integer() | nil, now_ms :: integer()) :: boolean()
+  def blind?(nil, _now_ms), do: false
+  def blind?(pictured_ms, now_ms), do: now_ms - pictured_ms >= @blind_ms
 
   defp smooth(nil, seen), do: seen
   defp smooth(place, nil), do: place

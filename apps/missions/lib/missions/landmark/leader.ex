@@ -3,12 +3,13 @@ defmodule Missions.Landmark.Leader do
   # Decides what the leader does besides tracking the landmark: it announces where it is supposed to be
   # (`.Announcement`), maintains the order of the slots when robots leave and join (`.Slots`), and
   # judges whether the shape is formed. Pure.
+  alias Hal.Pose
   alias Robot.Localiser.Anchors
   alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
-  alias Missions.Landmark.Leader.{Announcement, Slots}
+  alias Missions.Landmark.{Claim, Merge, Shape}
+  alias Missions.Landmark.Leader.{Announcement, Loss, Slots}
 
   # A landmark farther off than this is driven after, to `Slots.near/0`.
   @far 1.9
@@ -18,9 +19,12 @@ defmodule Missions.Landmark.Leader do
   # this long.
   @formed_ms 1_000
   @unformed_ms 500
-  # The landmark is lost if it was not seen for this long; a little later the leader looks around.
+  # People are told again that a shape is formed if it was not for this long, or if the leader has moved by so much (metres,
+  # radians), or the shape or its robots have changed: not of each time that a robot at the edge of its place moves.
+  @again_ms 20_000
+  @moved 0.3
+  # The landmark is lost if it was not seen for this long; `Loss` tells what the leader does about it.
   @lost_ms 3_000
-  @scan_ms 5_000
   @unheard_ms 1_500
   # For this long a new leader sends its place to all, not only to its child.
   @fresh_ms 500
@@ -29,23 +33,30 @@ defmodule Missions.Landmark.Leader do
             good_ms: nil,
             bad_ms: nil,
             formed?: false,
+            told: nil,
+            unformed_ms: 0,
             lost?: false,
             no_room?: false,
             heard_ms: nil,
+            loss: %Loss{},
             shape: %Shape{}
 
   @typedoc """
   `sequence` numbers the anchors; the shape has been right since `good_ms`, or wrong since
-  `bad_ms`; `heard_ms` is when somebody was last known to hear this leader.
+  `bad_ms`; it is not formed since `unformed_ms`, and people were `told` of where the leader stood in which shape when it was;
+  `heard_ms` is when somebody was last known to hear this leader.
   """
   @type t :: %__MODULE__{
           sequence: non_neg_integer(),
           good_ms: integer() | nil,
           bad_ms: integer() | nil,
           formed?: boolean(),
+          told: {Pose.t(), shape :: term()} | nil,
+          unformed_ms: integer(),
           lost?: boolean(),
           no_room?: boolean(),
           heard_ms: integer() | nil,
+          loss: Loss.t(),
           shape: Shape.t()
         }
 
@@ -72,6 +83,7 @@ defmodule Missions.Landmark.Leader do
     leadership = %{
       mission.leadership
       | formed?: false,
+        told: nil,
         good_ms: nil,
         bad_ms: nil,
         shape: Shape.new()
@@ -107,7 +119,7 @@ defmodule Missions.Landmark.Leader do
   end
 
   defp lead(mission) do
-    mission = mission |> Slots.update() |> Announcement.update()
+    mission = mission |> Loss.update() |> Slots.update() |> Announcement.update()
     {mission, formed} = judge(mission)
     {mission, lost} = miss(mission)
     {mission, no_room} = room(mission)
@@ -173,16 +185,32 @@ defmodule Missions.Landmark.Leader do
 
     cond do
       not leadership.formed? and good? and now - leadership.good_ms >= @formed_ms ->
-        {%{mission | leadership: %{leadership | formed?: true}},
-         [{:stage, :formed, formed(mission)}]}
+        tell(%{mission | leadership: %{leadership | formed?: true}})
 
       leadership.formed? and not good? and now - leadership.bad_ms >= @unformed_ms ->
-        {%{mission | leadership: %{leadership | formed?: false}}, []}
+        {%{mission | leadership: %{leadership | formed?: false, unformed_ms: now}}, []}
 
       true ->
         {%{mission | leadership: leadership}, []}
     end
   end
+
+  defp tell(%{leadership: leadership, percept: %{pose: pose}} = mission) do
+    shape = {mission.order, mission.asked_no, leadership.shape.formation, leadership.shape.spots}
+
+    if news?(leadership, pose, shape, mission.now_ms),
+      do: {put_in(mission.leadership.told, {pose, shape}), [{:stage, :formed, formed(mission)}]},
+      else: {mission, []}
+  end
+
+  defp news?(%{told: {then, shape}} = leadership, pose, shape, now) do
+    turned = abs(Pose.wrap(pose.heading - then.heading))
+
+    now - leadership.unformed_ms >= @again_ms or Pose.distance(then, pose) > @moved or
+      turned > @moved
+  end
+
+  defp news?(_other, _pose, _shape, _now), do: true
 
   # If there was no room for the shape that was asked for, which one it is instead.
   defp formed(%{leadership: %{shape: %{rung: rung}}} = mission) do
@@ -221,23 +249,19 @@ defmodule Missions.Landmark.Leader do
         do: [{:stage, :lost, %{epoch: mission.epoch}}],
         else: []
 
-    {put_in(mission.leadership.lost?, lost?), stage}
+    told = if lost?, do: nil, else: mission.leadership.told
+    {%{mission | leadership: %{mission.leadership | lost?: lost?, told: told}}, stage}
   end
 
-  # A leader that has not seen the landmark for long looks all around for it. A new leader may
-  # have seen it with its camera turned aside, and look ahead now: it turns to where the landmark
+  # A new leader may have seen the landmark with its camera turned aside, and look ahead now: it turns to where the landmark
   # was.
-  defp goal(mission) do
-    if LandmarkTrack.fresh?(mission.sight, mission.now_ms, @scan_ms) or
-         mission.now_ms - mission.since_ms < @scan_ms do
-      {near, far} = range(mission)
-      place = mission.sight && mission.sight.place
-      options = [colour: mission.colour, near: near, far: far, place: place]
-      {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
-    else
-      turn = div(mission.now_ms, 20_000)
-      {:goal, {:seek, mission.epoch, turn}, {Robot.Behaviour.FindBlob, [colour: mission.colour]}}
-    end
+  defp goal(mission), do: Loss.goal(mission) || track(mission)
+
+  defp track(mission) do
+    {near, far} = range(mission)
+    place = mission.sight && mission.sight.place
+    options = [colour: mission.colour, near: near, far: far, place: place]
+    {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
   end
 
   defp range(%{formation: {:circle, _d} = formation, order: order}) do

@@ -24,6 +24,8 @@ defmodule Missions.Landmark.Marks do
   @landmark_across {0.005, 0.005}
   # A robot slower than this stands still, in m/s and rad/s.
   @slow 0.05
+  # What was said so long ago (ms) may not hold any more.
+  @fresh_ms 500
   # Of so many of the nearest robots, and so many of the nearest ahead, the picture is asked.
   @nearest 20
   # A robot in place is at most this far from its slot in 95 of 100 cases, in metres.
@@ -54,7 +56,23 @@ defmodule Missions.Landmark.Marks do
       end
 
     marks = landmark(mission) ++ robots
-    %Anchors{frame: frame(mission, leader), marks: marks}
+    %Anchors{frame: frame(mission, leader), marks: marks, told: seen(mission, ahead)}
+  end
+
+  # Where one of those ahead, which knows its own place, sees this robot stand; only one that has no pictures itself needs that.
+  defp seen(%{percept: percept, me: me, anchor: anchor} = mission, ahead) do
+    with true <- LandmarkTrack.blind?(mission.pictured_ms, mission.now_ms),
+         true <- Landmark.State.slow?(percept, @slow) do
+      Enum.find_value(ahead, fn id ->
+        with %{at_ms: at_ms} = peer when mission.now_ms - at_ms < @fresh_ms <- percept.peers[id],
+             true <- told?(id, peer, anchor),
+             %{sees: {^me, {x, y}, sd}} <- Claim.of(peer.beat),
+             do: %{at: {x / 1_000, y / 1_000}, sd: sd / 1_000},
+             else: (_nothing -> nil)
+      end)
+    else
+      _needs_none -> nil
+    end
   end
 
   defp neighbours(%{peers: peers}, _ahead) when map_size(peers) <= @nearest, do: peers

@@ -2,7 +2,9 @@ defmodule Missions.Landmark.SelfReport do
   @moduledoc false
   # Tells what a robot claims of its landmark mission: to all others (`Missions.Landmark.Claim`), and to people. Pure.
   alias Missions.Landmark
-  alias Missions.Landmark.{Blocker, Lookout, Marks}
+  alias Missions.Landmark.{Blocker, LandmarkTrack, Lookout, Marks}
+  alias Missions.Landmark.Follower.Guide
+  alias Missions.Landmark.Leader.Loss
 
   @doc "The claim of this tick."
   @spec claim(Landmark.State.t()) :: map()
@@ -25,10 +27,12 @@ defmodule Missions.Landmark.SelfReport do
       uncertainty: uncertainty(mission.percept),
       in_place: mission.phase == :follow and mission.follower.in_place?,
       unsure: mission.phase == :follow and mission.follower.unsure?,
+      blind: LandmarkTrack.blind?(mission.pictured_ms, mission.now_ms),
       blocked: mission.phase == :follow and mission.follower.progress.blocked?,
       says: says(mission),
       blocked_by:
         if(mission.phase == :follow, do: Blocker.words(mission.follower.progress.blocker)),
+      sees: Guide.sees(mission),
       formed: leading? and mission.leadership.formed?,
       anchor: if(leading?, do: mission.anchor)
     }
@@ -40,6 +44,7 @@ defmodule Missions.Landmark.SelfReport do
     "in its slot, but NOT SURE of its place#{within}"
   end
 
+  defp says(%{phase: :lead} = mission), do: Loss.says(mission)
   defp says(%{phase: phase} = mission) when phase in [:wander, :rest], do: Lookout.says(mission)
   defp says(_mission), do: nil
 

@@ -10,11 +10,12 @@ defmodule Robot.Localiser.Anchors do
 
   `standing` is the colour of a standing object whose place is unknown (`Robot.Localiser.TurnCheck`). `walls?` tells whether the
   walls of a floor plan may correct the pose, too (`Robot.Localiser.Walls`), in a leader's frame only while that leader knows its own
-  place by the plan: not that of a leader itself, because a correction of it would have to move them all.
+  place by the plan: not that of a leader itself, because a correction of it would have to move them all. `told` is where
+  another robot sees this one stand (metres, in the frame), with the standard deviation of that place, if this robot needs it.
   """
   alias Hal.Pose
 
-  defstruct frame: nil, marks: [], standing: nil, walls?: true
+  defstruct frame: nil, marks: [], standing: nil, walls?: true, told: nil
 
   # Standard deviations count as at least this much, and places nearer to each other than this as
   # the same; in metres.
@@ -227,6 +228,8 @@ defmodule Robot.Localiser.Anchors do
   @type t :: %__MODULE__{
           frame: frame() | nil,
           marks: [mark()],
-          standing: String.t() | nil
+          standing: String.t() | nil,
+          walls?: boolean(),
+          told: %{at: Pose.point(), sd: float()} | nil
         }
 end

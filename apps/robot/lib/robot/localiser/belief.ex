@@ -264,6 +264,31 @@ defmodule Robot.Localiser.Belief do
     believe(belief, v, error / s, reduce(belief.covariance, v, s))
   end
 
+  @doc """
+  The belief after it was told that it stands at a place, with this standard deviation, unless that contradicts it.
+
+      iex> lost = Robot.Localiser.Frame.lost(Robot.Localiser.Belief.new(Hal.Pose.new(1, 0)))
+      iex> found = Robot.Localiser.Belief.placed(lost, {1.5, 0.25}, 0.1)
+      iex> {worst, _least, _heading} = Robot.Localiser.Belief.sd(found)
+      iex> {Float.round(found.pose.x, 1), Float.round(worst, 2)}
+      {1.5, 0.1}
+      iex> Robot.Localiser.Belief.placed(found, {2.5, 0.25}, 0.1) == found
+      true
+  """
+  @spec placed(t(), Pose.point(), sd :: float()) :: t()
+  def placed(%{pose: pose} = belief, {x, y}, sd) do
+    noise = sd * sd
+    [dx, dy] = [x - pose.x, y - pose.y]
+
+    if dx * dx <= @gate * (variance(belief, {1.0, 0.0, 0.0}) + noise) and
+         dy * dy <= @gate * (variance(belief, {0.0, 1.0, 0.0}) + noise) do
+      belief = measured(belief, dx, {1.0, 0.0, 0.0}, noise)
+      measured(belief, y - belief.pose.y, {0.0, 1.0, 0.0}, noise)
+    else
+      belief
+    end
+  end
+
   # The gain of the common error is zero: its covariances shrink, its variance does not.
   defp reduce(covariance, v, s) do
     covariance

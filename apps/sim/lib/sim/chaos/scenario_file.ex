@@ -29,7 +29,8 @@ defmodule Sim.Chaos.ScenarioFile do
     with {:ok, scenario} <-
            Scenario.new(
              about: String.slice(about, 0, 1_900),
-             options: Enum.reject(options, &default?/1),
+             # Its runs have no plan; those of a file have one where they do not say.
+             options: Keyword.put_new(Enum.reject(options, &default?/1), :plan, :none),
              script: script,
              expect:
                for({:ok, expected} <- [Map.fetch(@expected, violation.invariant)], do: expected)

@@ -20,14 +20,16 @@ defmodule Sim.Scenario.File do
   alias Sim.Scenario.{Expectation, Names, Text}
 
   @doc """
-  The scenario of the file at `path`, or the problems with it.
+  The scenario of the file at `path`, or the problems with it, those that its map shows among them.
 
       iex> Sim.Scenario.File.load("no/such.exs")
       {:error, ["no/such.exs: no such file or directory"]}
   """
   @spec load(Path.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
   def load(path),
-    do: with({:ok, text} <- Reader.text(path, "scenario"), do: parse(text, path))
+    do: with({:ok, text} <- Reader.text(path, "scenario"), do: read(text, path, &set_up/1))
+
+  defp set_up(scenario), do: Sim.Trial.Setup.problems(Scenario.trial(scenario))
 
   @doc """
   The scenario of a text; `name` is the file's in messages.
@@ -40,7 +42,9 @@ defmodule Sim.Scenario.File do
         "estop, reset, cut, join, loss, freeze, displace, blind, deaf, got {:kil, :mag1}; did you mean kill?"]}
   """
   @spec parse(String.t(), name :: String.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
-  def parse(text, name \\ "scenario") do
+  def parse(text, name \\ "scenario"), do: read(text, name, fn _scenario -> [] end)
+
+  defp read(text, name, more) do
     # Loads the modules whose names a file may use, which are found among existing atoms only.
     table = Scenario.table()
     _names = {Names.all(), Expectation.phases(), Swarm.Formation.kinds()}
@@ -48,8 +52,10 @@ defmodule Sim.Scenario.File do
     with {:ok, {_line, value} = tree} <- Reader.read(text, "scenario"),
          :ok <- keys(value),
          {:ok, values} <- Terms.check(tree, {:keys, table}),
-         [] <- Terms.at(Scenario.problems(values), tree) do
-      {:ok, Scenario.build(values)}
+         [] <- Terms.at(Scenario.problems(values), tree),
+         scenario = Scenario.build(values),
+         [] <- Terms.at(more.(scenario), tree) do
+      {:ok, scenario}
     else
       {:error, {line, words}} -> {:error, ["#{name}:#{line}: #{words}"]}
       {:error, problems} -> {:error, Reader.lines(problems, name)}

@@ -2,8 +2,8 @@ defmodule Sim.Scenario.Runner do
   @moduledoc """
   Runs a scenario in lockstep and judges what it expects, as a fold. Pure.
 
-  A run ends when all expectations are decided, when those that are left concern the whole run and
-  the fleet is calm (`Sim.Trial.done?/1`), or when its time is up.
+  A run ends when all expectations are decided, when those that are left concern the whole run, have been judged for 5 s
+  and the fleet is calm (`Sim.Trial.done?/1`), or when its time is up. One that ends at a time keeps it alive until then.
   """
   alias Sim.{Scenario, Trial}
   alias Sim.Scenario.{Check, Expectation, View}
@@ -41,18 +41,26 @@ defmodule Sim.Scenario.Runner do
     %{run | trial: trial, checks: Enum.map(run.checks, &Check.tick(&1, trial))}
   end
 
+  # As long as a fleet has to be calm.
+  @judged_s 5
+
   @doc "Whether the run is over."
   @spec done?(t()) :: boolean()
   def done?(%__MODULE__{trial: trial, checks: checks} = run) do
-    left = for %Check{status: status} <- checks, status in [:open, :holding], do: status
+    at_s = View.at_s(trial)
+    left = Enum.filter(checks, &(&1.status in [:open, :holding]))
 
     cond do
-      View.at_s(trial) >= Scenario.duration_s(run.scenario) -> true
+      at_s >= Scenario.duration_s(run.scenario) -> true
       checks != [] and left == [] -> true
-      :open in left -> false
+      Enum.any?(left, &wanted?(&1, at_s)) -> false
       true -> Trial.done?(trial)
     end
   end
+
+  defp wanted?(%{status: :open}, _at_s), do: true
+  defp wanted?(%{window: {from_s, :end}}, at_s), do: at_s < from_s + @judged_s
+  defp wanted?(_until_a_time, _at_s), do: true
 
   @doc "The verdicts if the run ended now, in the order of the expectations."
   @spec verdicts(t()) :: [verdict()]

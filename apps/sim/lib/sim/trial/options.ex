@@ -1,7 +1,7 @@
 defmodule Sim.Trial.Options do
   @moduledoc "Checks the options of a run, with their defaults. Pure."
   alias Hal.Options
-  alias Hal.Options.Type
+  alias Hal.Options.{Suggest, Type, Wording}
   alias Missions.Landmark
   alias Sim.Trial.{Cuts, Event}
   alias Swarm.Missions
@@ -63,7 +63,7 @@ defmodule Sim.Trial.Options do
     with {:ok, options} <- Options.check(asked, table(), "trial"),
          options = Map.merge(Map.new(@mission), Map.new(options)),
          {:ok, options} <- named(options),
-         :ok <- cuts(options),
+         :ok <- robots(options),
          :ok <- script(options),
          :ok <- hardware(options),
          do: {:ok, options}
@@ -85,16 +85,41 @@ defmodule Sim.Trial.Options do
     end
   end
 
-  defp cuts(%{cuts: cuts, robots: robots}) do
-    if Cuts.valid?(cuts, robots),
-      do: :ok,
-      else:
-        refuse(
-          :cuts,
-          cuts,
-          "[{from_s, to_s, [[:mag1], [:mag2]]}] or " <>
-            "[{from_s, :end, {:link, :mag1, :mag2}}], with robots of this run,"
-        )
+  @doc "What is wrong with values of the table that each by itself does not show: names of robots that the run does not have."
+  @spec problems(map()) :: [Type.problem()]
+  def problems(%{robots: robots} = options) do
+    cuts =
+      "expected [{from_s, to_s, [[:mag1], [:mag2]]}] or " <>
+        "[{from_s, :end, {:link, :mag1, :mag2}}], with robots of this run, got "
+
+    if(Cuts.valid?(options.cuts, robots),
+      do: [],
+      else: [{["cuts"], cuts <> Wording.show(options.cuts)}]
+    ) ++
+      for {{who, _at_s} = kill, n} <- Enum.with_index(options.kills, 1),
+          who not in [:leader | robots],
+          do:
+            {["kills", "#{n}"],
+             "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
+               Suggest.hint(inspect(who), robots)}
+  end
+
+  @doc "Whether robots have the floor plan, if that is not said: those that make a map themselves do not."
+  @spec plan(term()) :: :none | :known
+  def plan(nil), do: :known
+
+  def plan(mission) do
+    case Missions.choose(mission, nil) do
+      {:ok, {module, _own}} -> if function_exported?(module, :map, 1), do: :none, else: :known
+      {:error, _line} -> :known
+    end
+  end
+
+  defp robots(options) do
+    case problems(options) do
+      [] -> :ok
+      problems -> {:error, Options.line(problems, "trial")}
+    end
   end
 
   defp script(%{script: script, robots: robots}) do

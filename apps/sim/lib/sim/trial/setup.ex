@@ -36,21 +36,46 @@ defmodule Sim.Trial.Setup do
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
-    with {:ok, options} <- Options.check(options), do: set_up(options)
+    with {:ok, options} <- Options.check(options),
+         {:error, {_path, line}} <- set_up(options),
+         do: {:error, line}
+  end
+
+  @doc """
+  What the map shows to be wrong with options: a map that cannot be read, and places where there is a wall. Each problem has
+  the path to its option.
+
+      iex> Sim.Trial.Setup.problems(robots: [:mag1], script: [{5, {:move, {99, 0}}}])
+      [{["script", "1"], "the landmark cannot stand at 99.0,0.0: map hall is 14.0 x 14.0 m around its centre"}]
+  """
+  @spec problems(keyword() | map()) :: [Hal.Options.Type.problem()]
+  def problems(options) do
+    with {:ok, options} <- Options.check(options), {:error, {path, line}} <- set_up(options) do
+      [{path, String.replace_prefix(line, "map: ", "")}]
+    else
+      {:error, line} -> [{[], line}]
+      {:ok, _setup} -> []
+    end
   end
 
   defp set_up(options) do
     bodies = for id <- options.robots, do: {id, profile(id).radius}
     landmark = landmark(options.landmark)
-    places = for {_x, _y} = place <- [landmark | Enum.map(options.moves, &elem(&1, 0))], do: place
+    asked = for {_x, _y} = place <- [landmark], do: place
+    moves = for {place, _at_s} <- options.moves, do: place
 
-    with {:ok, map} <- Sim.Floorplan.open(options.map, length(options.robots)),
-         :ok <- check_landmarks(map, places),
+    with {:ok, map} <- at(["map"], Sim.Floorplan.open(options.map, length(options.robots))),
+         :ok <- at(["landmark"], check_landmarks(map, asked)),
+         :ok <- at(["moves"], check_landmarks(map, moves)),
          :ok <- check_script(map, options),
-         {:ok, landmark, starts} <- Sim.Floorplan.places(map, bodies, options.seed, landmark) do
+         {:ok, landmark, starts} <-
+           at(["map"], Sim.Floorplan.places(map, bodies, options.seed, landmark)) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
   end
+
+  defp at(path, {:error, line}), do: {:error, {path, line}}
+  defp at(_path, fine), do: fine
 
   @doc "The options of `Swarm.Member.new/1`, one list a robot, in the order of the fleet."
   @spec members(t()) :: [keyword()]
@@ -78,12 +103,21 @@ defmodule Sim.Trial.Setup do
 
   # Places that a script names, which depend on the map.
   defp check_script(map, options) do
-    Enum.find_value(options.script, :ok, fn
-      {_at_s, {:move, place}} -> with :ok <- check_landmarks(map, [place]), do: nil
-      {_at_s, {:displace, who, {x, y, _deg}}} -> check_place(map, who, {x, y}, options.robots)
-      _anywhere -> nil
+    options.script
+    |> Enum.with_index(1)
+    |> Enum.find_value(:ok, fn {{_at_s, event}, n} ->
+      with {:error, _line} = error <- check_event(map, event, options.robots),
+           do: at(["script", "#{n}"], error),
+           else: (_fine -> nil)
     end)
   end
+
+  defp check_event(map, {:move, place}, _robots), do: check_landmarks(map, [place])
+
+  defp check_event(map, {:displace, who, {x, y, _deg}}, robots),
+    do: check_place(map, who, {x, y}, robots)
+
+  defp check_event(_map, _event, _robots), do: :ok
 
   defp check_place(map, who, {x, y} = place, robots) do
     ids = if who == :leader, do: robots, else: [who]

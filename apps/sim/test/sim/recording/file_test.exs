@@ -3,6 +3,14 @@ defmodule Sim.Recording.FileTest do
   alias Sim.{Recorder, Recording, Replay, Trial}
   @moduletag :tmp_dir
 
+  # A file system of its own, where this may be done.
+  @probe Path.join(System.tmp_dir!(), "sim-#{System.pid()}")
+  File.mkdir_p!(@probe)
+  @probed "mount -t tmpfs -o size=1m none \"$1\" && umount \"$1\""
+  {_said, status} = System.cmd("sh", ["-c", @probed, "sh", @probe], stderr_to_stdout: true)
+  File.rmdir!(@probe)
+  @mounts status == 0
+
   defp write(path, ticks) do
     {:ok, setup} = Trial.setup(%{robots: [:mag1, :mag2], seed: 5, blobs: :direct})
     {:ok, recorder} = Recorder.start_link(path, setup)
@@ -34,6 +42,25 @@ defmodule Sim.Recording.FileTest do
 
     assert Replay.trial(replay).world == trial.world
     assert [{2_100, _entries} | _] = Enum.to_list(Recording.File.ticks(file, from_ms: 2_100))
+  end
+
+  unless @mounts, do: @tag(skip: "no file system can be mounted here")
+
+  test "on a full disk the file ends whole, with what found room", %{tmp_dir: folder} do
+    {_said, 0} = System.cmd("mount", ["-t", "tmpfs", "-o", "size=400k", "none", folder])
+    on_exit(fn -> {_said, 0} = System.cmd("umount", ["-l", folder]) end)
+    path = Path.join(folder, "run.mcap")
+    {closed, setup, _trial} = write(path, 400)
+    assert closed == {:error, "#{path} cannot be written: no space left on device"}
+
+    assert {:ok, %{whole?: true, setup: ^setup} = file} = Recording.File.open(path)
+    ticks = for {at_ms, _entries} <- Recording.File.ticks(file), do: at_ms
+    assert length(ticks) in 10..399
+    assert ticks == for(n <- 1..length(ticks), do: 100 * n)
+
+    # Every byte belongs to a whole record.
+    assert Recording.File.last_ms(file) == List.last(ticks)
+    assert String.ends_with?(File.read!(path), Mcap.magic())
   end
 
   test "a file that was cut is read as far as it is whole", %{tmp_dir: folder} do

@@ -48,6 +48,11 @@ defmodule Sim.Scenario.FileTest do
      "one of mag1"},
     {"[script: [{5, {:tell, :mag1, {:formation, :lin, 1}}}]]",
      "a.exs:1: script.1.command.formation: ", "did you mean :line?"},
+    {"[robots: 1,\n cuts: [{1, 2, [[:mag9]]}]]", "a.exs:2: cuts: ",
+     "with robots of this run, got"},
+    {"[kills: [\n {:mag9, 3}]]", "a.exs:2: kills.1: ",
+     "or :leader, got {:mag9, 3}; did you mean"},
+    {"[seed: 1,\n hardware: [:mag1]]", "a.exs:2: hardware: ", "no run in lockstep has hardware"},
     {"[expect: [{:formd, by_s: 5}]]", "a.exs:1: expect.1: ", "did you mean formed?"},
     {"[expect: [{:formed}]]", "a.exs:1: expect.1.by_s: ", "is missing"},
     {"[expect: [{:formed, by: 5}]]", "a.exs:1: expect.1.by: ", "did you mean by_s?"},
@@ -61,6 +66,41 @@ defmodule Sim.Scenario.FileTest do
     {"[expect: [{:phase, :all, :laed, by_s: 2}]]", "a.exs:1: expect.1.phase: ",
      "did you mean :lead?"}
   ]
+
+  # What only the map shows: known when a file is opened.
+  @unfit [
+    {"[seed: 1,\n map: \"nowhere\"]", "2: map: expected hall, ", "got nowhere"},
+    {"[seed: 1,\n map: \"no/such.yaml\"]", "2: map: ", "no/such.yaml: no such file"},
+    {"[seed: 1,\n landmark: {99, 0}]", "2: landmark: ", "cannot stand at 99.0,0.0"},
+    {"[seed: 1,\n moves: [{{99, 0}, 3}]]", "2: moves: ", "cannot stand at 99,0"},
+    {"[script: [{1, :reset},\n {5, {:move, {99, 0}}}]]", "2: script.2: ", "cannot stand at"},
+    {"[script: [\n {5, {:displace, :mag1, {99, 0, 0}}}]]", "2: script.1: ", "there is a wall"}
+  ]
+
+  @tag :tmp_dir
+  test "what the map refuses is told with its line, too", %{tmp_dir: folder} do
+    file = Path.join(folder, "a.exs")
+
+    for {text, begins, says} <- @unfit do
+      File.write!(file, text)
+      assert {:error, [line]} = Scenario.File.load(file)
+      assert String.starts_with?(line, "#{file}:#{begins}"), line
+      assert line =~ says
+    end
+  end
+
+  test "robots have the floor plan, as in the demo, unless they make a map or the file says otherwise" do
+    plan = fn text ->
+      {:ok, scenario} = Scenario.File.parse(text)
+      Scenario.trial(scenario).plan
+    end
+
+    assert plan.("[robots: 2]") == :known
+    assert plan.("[robots: 2, plan: :sonar]") == :sonar
+    assert plan.("[robots: 2, mission: :patrol]") == :known
+    assert plan.("[robots: 2, mission: :explore]") == :none
+    assert plan.("[robots: 2, mission: {:explore, []}]") == :none
+  end
 
   for {text, begins, says} <- @bad do
     test "#{text} is refused in one line" do

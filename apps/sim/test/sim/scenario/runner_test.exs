@@ -39,6 +39,20 @@ defmodule Sim.Scenario.RunnerTest do
              [true, false, false, true, false, true, false, true, false, true, false, true, false]
   end
 
+  # It rests from some 45 s on.
+  test "an expectation with an end keeps a calm run alive until then, one without for 5 s from its beginning" do
+    options = [robots: [:mag1], landmark: :none, noise: :off, duration_s: 200, plan: :none]
+
+    ends = fn expect -> elem(run(options, [], expect), 0).simulated_s end
+    calm_s = ends.([{:never_phase, :mag1, :lead}])
+    assert calm_s < 100
+    assert ends.([{:never_phase, :mag1, :lead, from_s: 60, to_s: 130}]) == 130.0
+    assert ends.([{:speed_at_most, 1, to_s: 140}, :no_collision]) == 140.0
+    assert ends.([{:one_leader, after_s: 150, to_s: 160}]) == 150.0
+    assert ends.([{:never_phase, :mag1, :lead, from_s: 150}]) == 155.0
+    assert ends.([{:never_phase, :mag1, :lead, from_s: 10}]) == calm_s
+  end
+
   test "a verdict names the time and the figures" do
     {_result, [verdict]} = run(@alone, @drive, [{:speed_at_most, 0.2}])
     assert verdict.at_s > 0.2 and verdict.at_s < 3

@@ -5,6 +5,7 @@ defmodule Missions.Landmark.Leader.Announcement do
   # milliradians.
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Shape}
+  alias Missions.Landmark.Leader.Loss
   alias Missions.Landmark.Reference
 
   # A landmark that was measured at most this long ago is where it was reported.
@@ -17,6 +18,8 @@ defmodule Missions.Landmark.Leader.Announcement do
   def update(%{percept: percept, leadership: leadership} = mission) do
     sequence = leadership.sequence + 1
     place = mission.sight && mission.sight.place
+    {size, places} = leadership.shape.room
+    kept = Loss.kept(mission, mission.order)
 
     anchor = %Reference{
       leader: mission.me,
@@ -34,9 +37,10 @@ defmodule Missions.Landmark.Leader.Announcement do
       asked: mission.formation,
       asked_no: mission.asked_no,
       order: mission.order,
-      size: elem(leadership.shape.room, 0),
-      places: elem(leadership.shape.room, 1),
-      trail: Shape.trail(leadership.shape, mission),
+      size: size,
+      places: Enum.take(places, length(mission.order)),
+      trail:
+        if(kept, do: Enum.map(kept, &elem(&1, 1)), else: Shape.trail(leadership.shape, mission)),
       of: mission.of,
       landmark: place && point(place),
       still: LandmarkTrack.still?(mission.sight, mission.now_ms, @still_ms)

@@ -2,7 +2,8 @@ defmodule Missions.Landmark.Leader.Slots do
   @moduledoc false
   # Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
   alias Missions.Landmark
-  alias Missions.Landmark.{Merge, Rounds, Shape}
+  alias Missions.Landmark.{Claim, Merge, Rounds, Shape}
+  alias Missions.Landmark.Leader.Loss
   alias Swarm.Formation.{Assignment, Chain}
 
   # Metres: nearer than 1.4 m the landmark's foot leaves the picture, and then its size is unknown.
@@ -16,7 +17,12 @@ defmodule Missions.Landmark.Leader.Slots do
 
   @doc "One tick: who has left and who has come, and a shape that there is room for."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
-  def update(mission), do: mission |> muster() |> shape()
+  def update(mission) do
+    case Loss.kept(mission, Rounds.view(mission)) do
+      nil -> mission |> muster() |> shape() |> sighted_first()
+      kept -> %{mission | order: Enum.map(kept, &elem(&1, 0))}
+    end
+  end
 
   # Robots that are gone leave their slots and those behind move up; new ones
   # join the tail.
@@ -31,6 +37,17 @@ defmodule Missions.Landmark.Leader.Slots do
 
     %{mission | order: kept ++ came}
   end
+
+  # Those behind find their places by those ahead, so a robot without pictures, which may not know its own, goes to the end. It
+  # stays there when its pictures come back, so that nobody moves for nothing.
+  defp sighted_first(%{order: order} = mission) do
+    beats = Landmark.State.beats(mission)
+    {blind, sighted} = Enum.split_with(order, &match?(%{blind: true}, claim(beats[&1])))
+    %{mission | order: sighted ++ blind}
+  end
+
+  defp claim(nil), do: nil
+  defp claim(beat), do: Claim.of(beat)
 
   # If the shape has changed, `:cost` assigns its slots again.
   defp shape(%{leadership: leadership} = mission) do

@@ -2,6 +2,7 @@ defmodule Missions.Landmark.Rounds.Opening do
   @moduledoc "Decides when a robot opens a round of the landmark mission, and when it leaves one. Pure."
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, Lookout, Merge, Policy}
+  alias Missions.Landmark.Leader.Loss
   alias Missions.Landmark.Rounds.View
   alias Swarm.Agreement.Round
   alias Swarm.Membership.NameSet
@@ -36,6 +37,10 @@ defmodule Missions.Landmark.Rounds.Opening do
 
       mission.phase == :follow and leader_lost?(mission) ->
         start(mission, view, :change)
+
+      # It has just looked around itself.
+      Loss.over?(mission) ->
+        start(%{mission | scan: :nothing}, view, :search)
 
       mission.verdict != nil or View.leading_epoch(mission) >= 0 ->
         mission
