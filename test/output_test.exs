@@ -9,7 +9,7 @@ defmodule System.OutputTest do
   } do
     commands = ["demo --headless --robots 2 --duration 3 --json -", "bench vision --help"]
     Enum.each(commands, &full/1)
-    full("fleet.secret #{Path.join(folder, "secret")}")
+    full("fleet.secret", [Path.join(folder, "secret")])
   end
 
   @tag :long
@@ -28,10 +28,10 @@ defmodule System.OutputTest do
         do: full(command)
   end
 
-  defp full(command) do
+  defp full(command, files \\ []) do
     name = command |> String.split() |> hd()
     line = "#{name}: the output cannot be written: no space left on device\n1\n"
-    told = sh("mix #{command} 2>&1 >/dev/full; echo $?")
+    told = sh("mix #{command} \"$@\" 2>&1 >/dev/full; echo $?", files)
 
     # With `--json -` the demo tells the rest there; and newer Erlangs log that their writer has ended.
     assert {command, told} == {command, line} or
@@ -46,8 +46,9 @@ defmodule System.OutputTest do
     assert sh("mix robot.check 2>&1 | true") == ""
   end
 
-  defp sh(script) do
-    {told, 0} = System.cmd("sh", ["-c", script], cd: @root)
+  # Files are words of their own, whatever their names are.
+  defp sh(script, files \\ []) do
+    {told, 0} = System.cmd("sh", ["-c", script, "sh" | files], cd: @root)
     told
   end
 end
