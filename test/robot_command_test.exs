@@ -41,6 +41,36 @@ defmodule System.RobotCommandTest do
   end
 
   @tag :tmp_dir
+  test "what cannot be printed is told, and a reader that has enough is not", %{tmp_dir: folder} do
+    script(Path.join(folder, "bin/robot"), "echo 4711; echo more")
+    environment = [{"CONVOY_RELEASE", folder}]
+
+    shell = fn line ->
+      System.cmd("sh", ["-c", line, "sh", @robot], env: environment, stderr_to_stdout: true)
+    end
+
+    for command <- ["status", "pid", "rpc 1"] do
+      assert {"robot: the output cannot be written\n1\n", 0} =
+               shell.(~s({ "$1" #{command} >/dev/full; } 2>&1; echo $?))
+    end
+
+    assert {"4711\n", 0} = shell.(~s("$1" status 2>&1 | head -n 1))
+  end
+
+  @tag :tmp_dir
+  test "restart has done its work when the robot answers anew", %{tmp_dir: folder} do
+    looks = Path.join(folder, "looks")
+
+    release = """
+    echo "$1" >>"#{looks}"
+    case "$2" in nil*) [ "$(grep -c rpc "#{looks}")" -ge 4 ] ;; esac
+    """
+
+    assert {"", 0} = robot(folder, release, ["restart"])
+    assert File.read!(looks) == "rpc\nrestart\nrpc\nrpc\nrpc\n"
+  end
+
+  @tag :tmp_dir
   test "daemon says that the robot was started and is not up, and where its log is", %{
     tmp_dir: folder
   } do

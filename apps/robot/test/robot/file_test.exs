@@ -255,6 +255,15 @@ defmodule Robot.FileTest do
              )
 
     assert line =~ "drive: drive option sonar_banks has 12 for 16"
+
+    # Also where one of them is named as in /dev.
+    for port <- ["/dev/ttyS1", "ttyS1"] do
+      assert [line] = lines("ptz: {Robot.FilePtz, port: \"#{port}\"}")
+
+      assert line ==
+               "mag1.exs:2: ptz.port: is #{inspect(port)}, the drive's: each has a line of its own"
+    end
+
     assert {:error, [line]} = Robot.File.parse("[#{@least}]", file: "robots/mag2.exs")
     assert line == "robots/mag2.exs:1: id: is :mag1, but the file is named mag2.exs"
   end
@@ -301,6 +310,13 @@ defmodule Robot.FileTest do
       assert_raise ArgumentError, fn -> String.to_existing_atom(strange) end
       assert_raise ArgumentError, fn -> String.to_existing_atom("Elixir.S" <> strange) end
     end
+  end
+
+  @tag :tmp_dir
+  test "a byte-order mark at its beginning is none of its text", %{tmp_dir: folder} do
+    file = Path.join(folder, "mag1.exs")
+    File.write!(file, "\uFEFF[#{@least}]")
+    assert {:ok, %Robot.File{id: :mag1}} = Robot.File.load(file)
   end
 
   test "text that is not a robot file ends in one line" do

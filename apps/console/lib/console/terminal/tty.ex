@@ -8,11 +8,12 @@ defmodule Console.Terminal.Tty do
 
   @type saved :: {device :: String.t(), settings :: String.t()}
 
-  @doc "Switches to single keys; `:error` if standard input and output are not a terminal."
+  @doc "Switches to single keys; `:error` if standard input and output are not a terminal, or one that cannot draw (`TERM=dumb`)."
   @spec open() :: {:ok, saved()} | :error
   def open do
     # Asking for the columns would not tell, because a terminal may not know its size.
-    with {:ok, device} <- terminal("/proc/self/fd/0"),
+    with true <- System.get_env("TERM") != "dumb",
+         {:ok, device} <- terminal("/proc/self/fd/0"),
          {:ok, _device} <- terminal("/proc/self/fd/1"),
          {:ok, settings} <- stty(device, ["-g"]),
          {:ok, _nothing} <- stty(device, @raw) do

@@ -16,7 +16,9 @@ defmodule Mix.Tasks.Console do
     with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
       options = Map.merge(%{"page-address" => {127, 0, 0, 1}}, Map.new(pairs))
 
-      if options["help"], do: IO.write(help()), else: options |> serve() |> refused()
+      if options["help"],
+        do: Hal.CommandOutput.run("console", fn -> IO.write(help()) end),
+        else: options |> serve() |> refused()
     else
       {:error, lines} -> refused({:error, lines ++ ["--help lists all options"]})
     end

@@ -12,6 +12,7 @@ defmodule Robot.File.CrossChecks do
         seen(robot),
         kept(robot),
         placed(robot),
+        shared(robot),
         colour(robot) | limits(robot) ++ driven(robot)
       ],
       &(&1 == nil)
@@ -42,6 +43,17 @@ defmodule Robot.File.CrossChecks do
   defp placed(%{map: map, start: start}) do
     with line when line != nil <- Robot.File.Map.start(map, start), do: {["start"], line}
   end
+
+  # A serial line has one device at its other end. A port may be a name in /dev.
+  defp shared(%{drive: {_drive, drive}, ptz: {_head, head}}) do
+    [base, head] = for options <- [drive, head], do: options[:port]
+
+    if is_binary(base) and is_binary(head) and
+         Path.expand(base, "/dev") == Path.expand(head, "/dev"),
+       do: {["ptz", "port"], "is #{inspect(head)}, the drive's: each has a line of its own"}
+  end
+
+  defp shared(_robot), do: nil
 
   defp colour(%{colours: nil}), do: nil
 

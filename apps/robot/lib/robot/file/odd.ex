@@ -17,7 +17,8 @@ defmodule Robot.File.Odd do
   @beyond_m 0.005
 
   @doc """
-  All warnings, one line each; `there?` reports whether a device exists on this machine.
+  All warnings, one line each; `there?` reports whether a device exists on this machine, and `kind` what it is (the type of
+  `File.Stat`).
 
       iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
       ...>   drive: {Some.Drive, [port: "/dev/ttyS9"]}, limits: [max_turn_acceleration: 0.017]}
@@ -29,12 +30,16 @@ defmodule Robot.File.Odd do
       ["/run/base is not on this machine; it must be on the robot's"]
       iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "base"]}}, &(&1 == "/dev/base"))
       []
+      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "/tmp"]}}, fn _ -> true end, fn _ -> :directory end)
+      ["/tmp is a directory here; a serial line is a device"]
   """
-  @spec lines(Robot.File.t(), (Path.t() -> boolean())) :: [String.t()]
-  def lines(%Robot.File{} = robot, there?) do
+  @spec lines(Robot.File.t(), (Path.t() -> boolean()), (Path.t() -> atom())) :: [String.t()]
+  def lines(%Robot.File{} = robot, there?, kind \\ fn _path -> :device end) do
     limits(robot) ++
       narrow(robot) ++
-      drive(robot) ++ words(robot.drive) ++ poses(robot.profile) ++ devices(robot, there?)
+      drive(robot) ++
+      words(robot.drive) ++
+      poses(robot.profile) ++ devices(robot, there?) ++ strange(robot, there?, kind)
   end
 
   defp limits(%{profile: kind} = robot) do
@@ -145,6 +150,16 @@ defmodule Robot.File.Odd do
       {_port, "/dev/" <> _ = source} -> [source]
       _neither -> []
     end
+  end
+
+  defp strange(robot, there?, kind) do
+    for {_module, options} <- [robot.drive, robot.ptz],
+        port = options[:port],
+        is_binary(port),
+        path = Enum.find([port, Path.expand(port, "/dev")], there?),
+        kind.(path) not in [:device, :other],
+        uniq: true,
+        do: "#{port} is a #{kind.(path)} here; a serial line is a device"
   end
 
   defp devices(robot, there?) do

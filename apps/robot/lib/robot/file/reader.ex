@@ -49,7 +49,8 @@ defmodule Robot.File.Reader do
     # Reading a pipe or a device might never end.
     with {:ok, %File.Stat{type: :regular, size: size}} when size <= @largest <- File.stat(path),
          {:ok, text} <- File.read(path) do
-      {:ok, text}
+      # Some editors write a byte-order mark.
+      {:ok, String.replace_prefix(text, "\uFEFF", "")}
     else
       {:ok, %File.Stat{type: :regular}} ->
         {:error, ["#{path}: no #{what} is larger than #{div(@largest, 1024)} kB"]}

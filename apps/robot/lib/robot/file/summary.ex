@@ -29,7 +29,7 @@ defmodule Robot.File.Summary do
         there? \\ &File.exists?/1,
         writable? \\ &Robot.Recorder.Options.writable?/1
       ) do
-    odd = Odd.lines(robot, there?) ++ unwritable(robot.record, writable?)
+    odd = Odd.lines(robot, there?, &kind/1) ++ unwritable(robot.record, writable?)
 
     title =
       case length(odd) do
@@ -39,6 +39,13 @@ defmodule Robot.File.Summary do
       end
 
     [title | lines(robot)] ++ Enum.flat_map(odd, &row({:WARNING, &1}))
+  end
+
+  defp kind(path) do
+    case File.stat(path) do
+      {:ok, %File.Stat{type: type}} -> type
+      {:error, _unknown} -> :device
+    end
   end
 
   @doc """

@@ -82,7 +82,7 @@ defmodule Robot.Navigation.MapFile do
   defp read(file) do
     with {:ok, %File.Stat{type: :regular}} <- File.stat(file),
          {:ok, bytes} <- File.read(file) do
-      {:ok, bytes}
+      {:ok, String.replace_prefix(bytes, "\uFEFF", "")}
     else
       {:ok, %File.Stat{type: type}} -> {:error, "is a #{type}, not a file"}
       {:error, reason} -> {:error, :file.format_error(reason)}
