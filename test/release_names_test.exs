@@ -152,6 +152,6 @@ defmodule System.ReleaseNamesTest do
     given = [{"CONVOY_INTERFACE", "300.1.2.3"}, {"MIX_ENV", "#{Mix.env()}"}]
     assert {said, status} = run(context, "bin/node", node, given)
     assert status != 0
-    assert said =~ ~S(mesh option interface: expected an IPv4 address)
+    assert said =~ ~S(CONVOY_INTERFACE: expected an IPv4 address)
   end
 end

@@ -20,7 +20,7 @@ defmodule System.SoakTest do
   test "six robots hold out for two minutes, and nothing is left of them" do
     assert {said, 0} = soak(["2", "5"])
     assert said =~ "All that was checked held."
-    [_line, journal] = Regex.run(~r/written to (\S+)/, said)
+    [_line, journal] = Regex.run(~r/written to (.+)/, said)
     [_line, os_pid] = Regex.run(~r/-(\d+)\.log/, journal)
     assert Path.wildcard(Path.join(System.tmp_dir!(), "convoy-soak-#{os_pid}-*")) == []
     File.rm!(journal)

@@ -12,7 +12,7 @@ defmodule Robot.Control.Crash do
   @theirs [:kernel, :stdlib, :elixir, :erts, :compiler]
 
   @doc "Calls a function of the mission (`:pilot`) or of a behaviour (`:executive`); if it fails, tells so, and fails as it did."
-  @spec told(Robot.Config.t(), Board.t(), :pilot | :executive, (() -> result)) :: result
+  @spec told(Robot.Config.t(), Board.t(), :pilot | :executive, (... -> result)) :: result
         when result: term()
   def told(config, board, part, function) do
     function.()
