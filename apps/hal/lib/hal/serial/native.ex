@@ -129,9 +129,10 @@ defmodule Hal.Serial.Native do
     end
   end
 
+  # As soon as the program may have said the last words, which it does at this very millisecond.
   defp silent?(%{counters: counters} = line, at_ms) do
     :counters.get(counters, @words) > 0 and
-      at_ms - :counters.get(counters, @life_ms) > line.keep_alive_ms
+      at_ms - :counters.get(counters, @life_ms) >= line.keep_alive_ms
   end
 
   # A VM that was frozen itself has given few signs meanwhile.
