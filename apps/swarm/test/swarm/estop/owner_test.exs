@@ -84,7 +84,7 @@ defmodule Swarm.EStop.OwnerTest do
     File.rm!(place)
     File.mkdir!(place)
     eventually(fn -> File.exists?(file) end)
-    refute inspect(Swarm.status(id)) =~ "NOT ON ITS DISK"
+    eventually(fn -> not (inspect(Swarm.status(id)) =~ "NOT ON ITS DISK") end)
     assert Swarm.ask(id, :estop) == :ok
 
     # A reset that the disk does not take is carried out, and told as well: the next start would be held.
