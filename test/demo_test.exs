@@ -36,13 +36,14 @@ defmodule Demo.Case do
 end
 
 defmodule System.DemoHardwareTest do
-  use Demo.Case, async: true
+  # Not beside other demos: a robot with real drivers that gets no processor for 0.2 s loses its line.
+  use Demo.Case, async: false
   @moduletag :realtime
 
   test "robots with real drivers find their place among the others, in real time" do
     line = "--headless --robots 2 --hardware mag:1,min:1 --blobs direct --seed 1"
     {output, told, status} = demo(line)
-    assert {told, status} == {"", 0}
+    assert {told, status} == {"", 0}, "status #{status}, #{told}#{output}"
 
     assert [_all, folder] =
              Regex.run(~r"mag1 has real drivers: its base on (/\S+)/mag1\.base", output)

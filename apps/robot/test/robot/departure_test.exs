@@ -183,12 +183,4 @@ defmodule Robot.DepartureTest do
          do: radius,
          else: (_not_yet -> nil)
   end
-
-  defp eventually(look, left \\ 2_000) do
-    case look.() do
-      nil when left == 0 -> flunk("it did not come to pass")
-      nil -> receive(do: (:never -> nil), after: (5 -> eventually(look, left - 1)))
-      found -> found
-    end
-  end
 end

@@ -106,6 +106,17 @@ defmodule Robot.Case do
     :ok
   end
 
+  @doc "Looks again until it is true, and returns what it is. For what no event tells."
+  def eventually(look, left \\ 2_000) do
+    found = look.()
+
+    cond do
+      found -> found
+      left == 0 -> flunk("it did not come to pass")
+      true -> receive(do: (:never -> nil), after: (5 -> eventually(look, left - 1)))
+    end
+  end
+
   @doc "Waits until the wheels roll."
   def rolls do
     assert_receive {:drive, {:drive, %Twist{linear: v}}, _} when v > 0

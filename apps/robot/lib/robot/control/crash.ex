@@ -33,9 +33,9 @@ defmodule Robot.Control.Crash do
   @doc """
   What happened and where, in one line: the first place in the stack that is neither Elixir's nor Erlang's.
 
-      iex> Robot.Control.Crash.line(:error, %RuntimeError{message: "boom"}, [{Gather, :handle, 2, [file: 'lib/gather.ex', line: 42]}])
+      iex> Robot.Control.Crash.line(:error, %RuntimeError{message: "boom"}, [{Gather, :handle, 2, [file: ~c"lib/gather.ex", line: 42]}])
       "(RuntimeError) boom, lib/gather.ex:42"
-      iex> Robot.Control.Crash.line(:error, :badarith, [{:erlang, :/, [1, 0], []}, {Gather, :share, 1, [file: 'lib/gather.ex', line: 7]}])
+      iex> Robot.Control.Crash.line(:error, :badarith, [{:erlang, :/, [1, 0], []}, {Gather, :share, 1, [file: ~c"lib/gather.ex", line: 7]}])
       "(ArithmeticError) bad argument in arithmetic expression: 1 / 0, lib/gather.ex:7"
       iex> Robot.Control.Crash.line(:throw, :lost, [])
       "(throw) :lost"

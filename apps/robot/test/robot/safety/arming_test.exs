@@ -40,14 +40,6 @@ defmodule Robot.Safety.ArmingTest do
   defp drive(id), do: Names.whereis(id, :drive)
   defp arming(id), do: drive(id) && Device.arming(drive(id)).state
 
-  defp eventually(condition, left \\ 1_000) do
-    cond do
-      condition.() -> :ok
-      left == 0 -> flunk("never")
-      true -> receive(do: (:never -> :ok), after: (5 -> eventually(condition, left - 1)))
-    end
-  end
-
   # Each ends with a drive that is online again.
   defp disarm(:silence, id, reports) do
     :counters.put(reports, 1, 1)

@@ -92,7 +92,8 @@ defmodule Robot.Safety.GateTest do
 
     Robot.Case.resume(file)
     assert Task.await(answer) == :ok
-    assert Board.saved?(Board.find!(id))
+    # What was cleared and set meanwhile is written after the answer.
+    eventually(fn -> Board.saved?(Board.find!(id)) end)
     assert File.exists?(file)
   end
 

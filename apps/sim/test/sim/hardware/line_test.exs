@@ -102,7 +102,9 @@ defmodule Sim.Hardware.LineTest do
     :ok = Emulator.change(emulator, :silence, [[2]])
     eventually(fn -> still?(context) end)
     eventually(fn -> health(id) == {:offline, :silent} end)
-    assert Hal.Device.arming(Names.whereis(id, :drive)).state == :disarmed
+    # A driver that is opening its line again answers with the reason.
+    eventually(fn -> match?(%{state: :disarmed}, Hal.Device.arming(Names.whereis(id, :drive))) end)
+
     :ok = Emulator.change(emulator, :silence, [[]])
     eventually(fn -> health(id) == :online end)
     # Nobody has armed it again.
