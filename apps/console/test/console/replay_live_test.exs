@@ -144,20 +144,23 @@ defmodule Console.ReplayLiveTest do
   test "a difference is shown, and gives status 2; so does a file without a state", %{
     tmp_dir: folder
   } do
-    reflex = Robot.Safety.Reflex.new(Hal.Profile.magellan())
+    config =
+      struct!(Robot.Config, id: :mag1, profile: Hal.Profile.magellan(), drive: {Some.Drive, []})
+
+    {gate, _effects} = Robot.Safety.Gate.init(config, %{}, 0)
     drive = {:drive, Hal.Twist.new(0.5, 0.0), []}
     robots = Recording.robots(%{mag1: %{offset_ms: 0, profile: nil}})
 
     entries = [
-      {:mag1, {:gate, :begin, {reflex, %{dry_run: false}}, 0}},
-      {:mag1, {:gate, :input, :step, 50}},
+      {:mag1, {:gate, :begin, gate, 0}},
+      {:mag1, {:gate, :input, :tick, 50}},
       {:mag1, {:gate, :effect, drive, 50}},
-      {:mag1, {:gate, :input, :step, 100}}
+      {:mag1, {:gate, :input, :tick, 100}}
     ]
 
     assert {2, text, ""} = replay(written(folder, robots, entries))
     assert text =~ "The replay differs from the recording once, first in this:\n"
-    assert text =~ "0.05 s mag1, gate, on :step\n  did then: [{:drive, %Hal.Twist{linear: 0.5"
+    assert text =~ "0.05 s mag1, gate, on :tick\n  did then: [{:drive, %Hal.Twist{linear: 0.5"
     assert text =~ "does now: [{:drive, %Hal.Twist{linear: 0.0, turn: 0.0}, [:dead_man]}]"
 
     assert {2, text, ""} = replay(written(folder, robots, tl(entries)))
@@ -178,7 +181,7 @@ defmodule Console.ReplayLiveTest do
     refute text =~ ": all "
 
     # A file of a folder begins in the middle: nothing is missing of it.
-    middle = [{:mag1, {:gate, :input, :step, 0}} | Enum.take(entries, 2)] ++ [good]
+    middle = [{:mag1, {:gate, :input, :tick, 0}} | Enum.take(entries, 2)] ++ [good]
     assert {0, text, ""} = replay(written(folder, robots, middle))
     assert text =~ "1 entry before its first state"
     assert text =~ "replayed: all 1 decisions on 1 inputs are as recorded."
@@ -187,12 +190,12 @@ defmodule Console.ReplayLiveTest do
   test "another version, and a file that cannot be made, are refused in one line", %{
     tmp_dir: folder
   } do
-    newer = :erlang.term_to_binary({:convoy_robots, 2, %{}})
+    newer = :erlang.term_to_binary({:convoy_robots, 3, %{}})
     path = written(folder, newer, [])
 
     assert replay(path) ==
              {1, "",
-              "replay: #{path} is a recording of version 2; this program reads version 1\n"}
+              "replay: #{path} is a recording of version 3; this program reads version 2\n"}
 
     options = Runs.options("--headless --hardware 1 --robots 1 --duration 1")
     options = %{options | record: "/proc/none.mcap"}

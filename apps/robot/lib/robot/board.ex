@@ -80,6 +80,9 @@ defmodule Robot.Board do
           since_ms: integer()
         }
 
+  @typedoc "The same in lockstep, as a map of what was put on it."
+  @type entries :: %{(key :: term()) => {value :: term(), at_ms :: integer()}}
+
   @type writer ::
           :drive
           | :ptz
@@ -186,7 +189,7 @@ defmodule Robot.Board do
 
   @doc "The value of a key, with its time, unless it is older than `max_age_ms`."
   @spec fetch(
-          t(),
+          t() | entries(),
           key :: term(),
           max_age_ms :: non_neg_integer() | :infinity,
           now_ms :: integer()
@@ -196,6 +199,13 @@ defmodule Robot.Board do
     # Numbers are smaller than atoms, so that nothing is older than `:infinity`.
     case unless_ended([], fn -> :ets.lookup(table, key) end) do
       [{_key, value, at_ms}] when now_ms - at_ms <= max_age_ms -> {:ok, value, at_ms}
+      _none_or_old -> :error
+    end
+  end
+
+  def fetch(entries, key, max_age_ms, now_ms) do
+    case entries do
+      %{^key => {value, at_ms}} when now_ms - at_ms <= max_age_ms -> {:ok, value, at_ms}
       _none_or_old -> :error
     end
   end
@@ -228,8 +238,9 @@ defmodule Robot.Board do
   end
 
   @doc "Whether the e-stop is latched; a robot whose board has ended is held."
-  @spec latched?(t()) :: boolean()
+  @spec latched?(t() | entries()) :: boolean()
   def latched?(%__MODULE__{latch: latch}), do: Latch.set?(latch)
+  def latched?(entries), do: match?(%{latch: {true, _at_ms}}, entries)
 
   @doc "Latches the e-stop. This process writes the file."
   @spec latch(t()) :: :ok
@@ -265,9 +276,9 @@ defmodule Robot.Board do
   end
 
   @doc "The frame in which the robot has left its start pose; `nil` if it has not."
-  @spec departed(t()) :: Departure.frame() | nil
+  @spec departed(t() | entries()) :: Departure.frame() | nil
   def departed(board) do
-    with {:ok, frame, _at_ms} <- fetch(board, :departed, :infinity),
+    with {:ok, frame, _at_ms} <- fetch(board, :departed, :infinity, 0),
          do: frame,
          else: (:error -> nil)
   end

@@ -18,8 +18,6 @@ defmodule Robot.Config do
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
     * `:send` - `{m, f, a}`; messages of the mission go to `apply(m, f, a ++ [to, message])`;
       `nil` drops them
-    * `:on_latch` - `{m, f, a}`, applied by the gate when its e-stop latch was set or cleared
-      directly (`Robot.Safety.Gate.estop/2`), or `nil`
     * `:clock` - `{m, f, a}` that returns integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
       they are sent `:step` and `:tick`, so that a test determines the order
@@ -56,7 +54,6 @@ defmodule Robot.Config do
                 mission: nil,
                 companions: [],
                 send: nil,
-                on_latch: nil,
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
                 arm: :auto,
@@ -85,7 +82,6 @@ defmodule Robot.Config do
           mission: module_options() | nil,
           companions: [module_options()],
           send: call() | nil,
-          on_latch: call() | nil,
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
@@ -154,7 +150,6 @@ defmodule Robot.Config do
       mission: [:driver, default: nil],
       companions: {:list, :driver},
       send: [:mfa, default: nil],
-      on_latch: [:mfa, default: nil],
       clock: :mfa,
       pace: {:one_of, [:clock, :manual]},
       arm: {:one_of, [:auto, :manual]},

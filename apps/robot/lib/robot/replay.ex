@@ -122,6 +122,7 @@ defmodule Robot.Replay do
   def state(%__MODULE__{parts: parts}, robot, role) do
     case parts do
       %{{^robot, ^role} => %{state: {%_{} = state, _facts}}} -> state
+      %{{^robot, ^role} => %{state: %_{} = state}} -> state
       _unknown -> nil
     end
   end

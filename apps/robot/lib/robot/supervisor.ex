@@ -20,7 +20,7 @@ defmodule Robot.Supervisor do
   """
   use Supervisor
   alias Hal.HardenedSupervisor
-  alias Robot.{Board, Devices, Names}
+  alias Robot.{Board, Devices, Host, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.{Gate, LivenessMonitor}
 
@@ -44,7 +44,7 @@ defmodule Robot.Supervisor do
     parts = [
       {Board, config},
       {Devices, config},
-      {Gate, config},
+      {Host, {Gate, config}},
       {LivenessMonitor, config},
       {Executive, {config, {Pilot, :hear, [config.id]}}},
       {Pilot, config}

@@ -102,7 +102,7 @@ defmodule Robot.DepartureTest do
     count(id, make_ref(), Pose.new(0, 0))
     assert_receive {[:robot, :executive, :away], _}
     assert eventually(fn -> radius(id) end) > 5.0
-    assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+    assert %{state: %{reflex: %{place: nil}}} = :sys.get_state(Names.via(id, :gate))
   end
 
   test "what cannot be written is told once, and tried again", %{path: path} do

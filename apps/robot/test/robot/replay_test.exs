@@ -6,7 +6,7 @@ defmodule Robot.ReplayTest do
   alias Robot.Mission.{Manual, Runner}
   alias Robot.{Percept, Recording, Replay}
   alias Robot.Replay.Roles
-  alias Robot.Safety.Reflex
+  alias Robot.Safety.Gate
   doctest Robot.Replay
   doctest Robot.Replay.Roles
   doctest Robot.Recording
@@ -19,7 +19,16 @@ defmodule Robot.ReplayTest do
     def handle(_event, count), do: {:ready, count + 1, [{:stage, :heard, %{count: count}}]}
   end
 
-  defp reflex, do: Reflex.new(Profile.magellan())
+  defp begun(more \\ []) do
+    config =
+      struct!(
+        Robot.Config,
+        [id: :mag1, profile: Profile.magellan(), drive: {Some.Drive, []}] ++ more
+      )
+
+    {gate, _effects} = Gate.init(config, %{}, 0)
+    gate
+  end
 
   # What a process of this role records for these inputs, one a 50 ms.
   defp recorded(role, state, inputs, from_ms \\ 0) do
@@ -51,10 +60,17 @@ defmodule Robot.ReplayTest do
     near = List.duplicate(5.1, 16) |> List.replace_at(11, 0.4)
 
     inputs =
-      [:step, {:wish, Twist.new(0.3, 0.1)}, :step, {:sense, {:sonar, near}}, :step] ++
-        [{:wish, Twist.new(0.3, 0.0)}, :step, :estop, :step, :reset, :forget, :step]
+      [
+        :tick,
+        {:cast, {:wish, Twist.new(0.3, 0.1)}},
+        :tick,
+        {:cast, {:sense, {:sonar, near}}},
+        :tick
+      ] ++
+        [{:cast, {:wish, Twist.new(0.3, 0.0)}}, :tick, {:ask, nil, :estop}, :tick] ++
+        [{:ask, nil, :reset}, {:cast, {:forget, nil}}, :tick]
 
-    begin = {reflex(), %{dry_run: false}}
+    begin = begun()
     {entries, state, at_ms} = recorded(:gate, begin, inputs)
     {[{:gate, :begin, begin, 0} | entries], state, at_ms}
   end
@@ -62,7 +78,7 @@ defmodule Robot.ReplayTest do
   test "what is as recorded is counted, and what is not is named" do
     {entries, _state, _at_ms} = gate()
     assert {%{{:mag1, :gate} => counts}, [], _replay} = replay(entries)
-    assert %{inputs: 12, decisions: 6, begun: 1, skipped: 0, lost: 0} = counts
+    assert %{inputs: 12, decisions: 10, begun: 1, skipped: 0, lost: 0} = counts
 
     drives? = &match?({:gate, :effect, {:drive, %Twist{linear: v}, _}, _} when v > 0, &1)
     at = Enum.find_index(entries, drives?)
@@ -71,7 +87,7 @@ defmodule Robot.ReplayTest do
     changed = List.replace_at(entries, at, {:gate, :effect, other, at_ms})
     assert {%{{:mag1, :gate} => counts}, [difference], _replay} = replay(changed)
 
-    assert %{robot: :mag1, role: :gate, at_ms: ^at_ms, input: :step, recorded: [^other]} =
+    assert %{robot: :mag1, role: :gate, at_ms: ^at_ms, input: :tick, recorded: [^other]} =
              difference
 
     assert difference.replayed == [{:drive, twist, limits}]
@@ -91,10 +107,10 @@ defmodule Robot.ReplayTest do
 
   test "without a state nothing is compared, from a checkpoint on everything" do
     {entries, state, at_ms} = gate()
-    {more, _state, _at_ms} = recorded(:gate, state, [:step, :step], at_ms)
+    {more, _state, _at_ms} = recorded(:gate, state, [:tick, :tick], at_ms)
     checkpoint = {:gate, :checkpoint, state, at_ms}
     assert {%{{:mag1, :gate} => counts}, [], _} = replay(entries ++ [checkpoint | more])
-    assert %{checked: 1, decisions: 8, skipped: 0} = counts
+    assert %{checked: 1, decisions: 12, skipped: 0} = counts
 
     middle = Enum.drop(entries, 5) ++ [checkpoint | more]
     assert {%{{:mag1, :gate} => counts}, [], _} = replay(middle)
@@ -107,21 +123,21 @@ defmodule Robot.ReplayTest do
   end
 
   test "a checkpoint with another state than the replay's differs in what is named" do
-    {entries, {reflex, facts}, at_ms} = gate()
-    other = {%{reflex | bumpers: [3]}, facts}
-    {more, _state, _at_ms} = recorded(:gate, other, [:step], at_ms)
+    {entries, state, at_ms} = gate()
+    other = %{state | presses: 3}
+    {more, _state, _at_ms} = recorded(:gate, other, [:tick], at_ms)
 
     assert {%{{:mag1, :gate} => counts}, [difference], _} =
              replay(entries ++ [{:gate, :checkpoint, other, at_ms} | more])
 
-    assert %{input: :checkpoint, recorded: [bumpers: [3]], replayed: [bumpers: []]} = difference
+    assert %{input: :checkpoint, recorded: [presses: 3], replayed: [presses: 1]} = difference
     assert counts.checked == 0 and counts.skipped == 0
   end
 
   test "lost entries are counted, and what follows waits for a state" do
     {entries, state, at_ms} = gate()
     {first, [_lost, _lost_too | rest]} = Enum.split(entries, 6)
-    {more, _state, _at_ms} = recorded(:gate, state, [:step], at_ms)
+    {more, _state, _at_ms} = recorded(:gate, state, [:tick], at_ms)
 
     all = first ++ [{:gate, :lost, 2, 100}] ++ rest ++ [{:gate, :checkpoint, state, at_ms} | more]
     assert {%{{:mag1, :gate} => counts}, [], _} = replay(all)
@@ -130,7 +146,7 @@ defmodule Robot.ReplayTest do
   end
 
   test "in a dry run, and without a head, other effects are right" do
-    {entries, _, _} = recorded(:gate, {reflex(), %{dry_run: true}}, [:step])
+    {entries, _, _} = recorded(:gate, begun(dry_run: true), [:tick])
 
     assert [_, {:gate, :effect, {:drive, twist, [:dry_run, :dead_man]}, 0}] = entries
     assert twist == Twist.zero()
@@ -218,7 +234,7 @@ defmodule Robot.ReplayTest do
     percept = %Percept{robot: :mag1, at_ms: 5, profile: profile}
 
     entries = [
-      {:mag1, {:gate, :input, {:sense, {:odometry, odometry}}, 5}},
+      {:mag1, {:gate, :input, {:cast, {:sense, {:odometry, odometry}}}, 5}},
       {:mag1, {:executive, :input, {:tick, percept}, 5}}
     ]
 
@@ -228,14 +244,13 @@ defmodule Robot.ReplayTest do
     assert Recording.read_robots(Recording.robots(robots)) == {:ok, robots}
     assert byte_size(bytes) < div(byte_size(:erlang.term_to_binary(entries)), 2)
 
-    assert {:error, "is a recording of version 99; this program reads version 1"} =
+    assert {:error, "is a recording of version 99; this program reads version 2"} =
              Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 99, %{}}))
 
     # Of a program whose states had other parts, or a file that somebody made.
-    {reflex, facts} = {reflex(), %{dry_run: false}}
-    old = {reflex |> Map.delete(:bumpers), facts}
+    old = Map.delete(begun(), :presses)
 
-    for {kind, what} <- [begin: old, checkpoint: {reflex, %{}}, lost: -1, begin: 1, other: 1] do
+    for {kind, what} <- [begin: old, checkpoint: {begun(), %{}}, lost: -1, begin: 1, other: 1] do
       bytes = :erlang.term_to_binary([{:mag1, {:gate, kind, what, 0}}])
       assert {:error, "has entries that" <> _} = Recording.read_trace(bytes, %{})
     end
@@ -246,7 +261,7 @@ defmodule Robot.ReplayTest do
           %{mag1: %{offset_ms: 0.5, profile: nil}}
         ] do
       assert {:error, "begins with something" <> _} =
-               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 1, robots}))
+               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 2, robots}))
     end
 
     junk = [<<>>, "junk", <<131, 80, 0xFFFFFFFF::32, 0>>, :erlang.term_to_binary([{:mag1, 3}])]

@@ -4,7 +4,7 @@ defmodule Robot.TraceTest do
   alias Hal.{Odometry, Pose}
   alias Robot.Control.Controller
   alias Robot.Mission.Runner
-  alias Robot.Safety.Reflex
+  alias Robot.Trace
   @moduletag :realtime
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
@@ -46,7 +46,11 @@ defmodule Robot.TraceTest do
     stop_supervised!(id)
 
     entries = for {_order, entry} <- :ets.tab2list(table), do: entry
-    assert compare(entries, :gate, Reflex.new(profile), &gate/3) > 20
+
+    assert [{:gate, :begin, gate, _at_ms}] =
+             for({:gate, :begin, _, _} = entry <- entries, do: entry)
+
+    assert compare(entries, :gate, gate, &gate/3) > 20
     controller = Controller.new(profile: profile, start: start)
     assert compare(entries, :executive, controller, &executive/3) > 20
     assert compare(entries, :pilot, nil, &pilot/3) == 6
@@ -73,18 +77,9 @@ defmodule Robot.TraceTest do
     length(effects)
   end
 
-  defp gate({:wish, twist}, at_ms, reflex), do: {[], Reflex.wish(reflex, twist, at_ms)}
-
-  defp gate({:sense, reading}, at_ms, reflex),
-    do: {[], elem(Reflex.sense(reflex, reading, at_ms), 0)}
-
-  defp gate(:forget, _at_ms, reflex), do: {[], elem(Reflex.forget(reflex), 0)}
-  defp gate(:estop, _at_ms, reflex), do: {[], Reflex.estop(reflex)}
-  defp gate(:reset, _at_ms, reflex), do: {[], Reflex.reset(reflex)}
-
-  defp gate(:step, at_ms, reflex) do
-    {twist, limits, reflex} = Reflex.step(reflex, at_ms)
-    {[{:drive, twist, limits}], reflex}
+  defp gate(input, at_ms, gate) do
+    {gate, effects} = Gate.handle(input, at_ms, gate, %{})
+    {Enum.filter(effects, &Trace.effect?/1), gate}
   end
 
   defp executive({:tick, percept}, _at_ms, before) do

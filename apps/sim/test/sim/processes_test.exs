@@ -207,7 +207,7 @@ defmodule Sim.ProcessesTest do
       {:message, message, _} -> Comms.hear(@me, message)
       {:command, command, _} -> :ok = Swarm.ask(@me, command)
       {:tick, _} -> send(pids.executive, :tick)
-      {:reflex, _} -> send(pids.gate, :step)
+      {:reflex, _} -> send(pids.gate, :tick)
     end
 
     if elem(input, 0) == :tick do

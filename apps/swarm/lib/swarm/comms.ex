@@ -61,7 +61,6 @@ defmodule Swarm.Comms do
     %{
       config
       | send: {__MODULE__, :say, [config.id]},
-        on_latch: {EStop, :latch, [config.id]},
         companions: companions
     }
   end

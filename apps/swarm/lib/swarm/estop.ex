@@ -7,7 +7,7 @@ defmodule Swarm.EStop do
   It alone owns the state of the emergency stop (`Swarm.EStop.State`), and publishes it on the
   board under `:estop`, for all others to read. The only other copy is the gate's latch, which
   this process sets. Who stops the gate directly (`Robot.Safety.Gate.estop/1`; of ours `mix calibrate` alone) sets
-  and clears it, too; the gate reports that (`latch/1`), and this process follows.
+  and clears it, too; the gate reports that by `:latch`, and this process follows.
 
   Nobody else decides, and nobody waits for this process: the comms process passes on what a
   heartbeat says if that differs from the board (`heard/3`), and is told of each change, so that
@@ -74,13 +74,6 @@ defmodule Swarm.EStop do
 
     :ok
   end
-
-  @doc """
-  Reports that the gate's latch was set or cleared directly; called by the gate
-  (`Robot.Config`, `:on_latch`).
-  """
-  @spec latch(robot :: atom()) :: :ok
-  def latch(robot), do: GenServer.cast(Names.via(robot, :estop), :latch)
 
   @doc """
   When the robot was last stopped, by any kind of stop (`System.monotonic_time/1`, microseconds);

@@ -19,7 +19,7 @@ defmodule Swarm.Member do
   alias Robot.{Mission, Percept}
   alias Robot.Control.Controller
   alias Robot.Mission.{Manual, Runner}
-  alias Robot.Safety.Reflex
+  alias Robot.Safety.Gate
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
@@ -37,7 +37,7 @@ defmodule Swarm.Member do
                         :square
                       ])
 
-  @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :reflex, :receiver]
+  @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :gate, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
@@ -52,7 +52,7 @@ defmodule Swarm.Member do
           mission: {module(), keyword()},
           runner: Runner.t(),
           controller: Controller.t(),
-          reflex: Reflex.t(),
+          gate: Gate.t(),
           receiver: Receiver.t(),
           stop: EStop.State.t(),
           entries: %{atom() => {term(), integer()}},
@@ -87,6 +87,12 @@ defmodule Swarm.Member do
     runner = Runner.new(options[:id], Controller.walls(controller))
     {runner, []} = Runner.start(runner, module, mission_options)
 
+    # In lockstep nothing is a device: the trial carries out what it is told.
+    config =
+      struct!(Robot.Config, Keyword.take(options, [:id, :profile]) ++ [drive: {__MODULE__, []}])
+
+    {gate, _started} = Gate.init(config, %{}, 0)
+
     %__MODULE__{
       id: options[:id],
       profile: options[:profile],
@@ -94,17 +100,15 @@ defmodule Swarm.Member do
       mission: options[:mission],
       runner: runner,
       controller: controller,
-      reflex: Reflex.new(options[:profile]),
+      gate: gate,
       receiver: Receiver.new(options[:id])
     }
   end
 
   @doc "Handles one input, and returns the effects."
   @spec step(t(), input()) :: {t(), [effect()]}
-  def step(member, {:reading, {key, value} = reading, at_ms}) do
-    {reflex, urgency} = Reflex.sense(member.reflex, reading, at_ms)
-    react(%{put(member, key, value, at_ms) | reflex: reflex}, urgency, at_ms)
-  end
+  def step(member, {:reading, {key, value} = reading, at_ms}),
+    do: member |> put(key, value, at_ms) |> gate({:cast, {:sense, reading}}, at_ms)
 
   def step(member, {:detections, detections}),
     do: {put(member, :detections, detections, detections.at_ms), []}
@@ -117,10 +121,8 @@ defmodule Swarm.Member do
   def step(member, {:command, {:estop, call}, at_ms}),
     do: latch(member, EStop.State.call(member.stop, call), at_ms)
 
-  def step(member, {:command, :reset, _at_ms}) do
-    stop = EStop.State.reset(member.stop)
-    {%{member | reflex: Reflex.reset(member.reflex), stop: stop}, []}
-  end
+  def step(member, {:command, :reset, at_ms}),
+    do: gate(%{member | stop: EStop.State.reset(member.stop)}, {:ask, nil, :reset}, at_ms)
 
   # A command that is accepted while all robots are stopped would begin with the reset.
   def step(%{stop: %{held: [_ | _]}} = member, {:command, command, _at_ms})
@@ -162,9 +164,9 @@ defmodule Swarm.Member do
 
   def step(member, {:tick, at_ms}) do
     {wish, outcome, controller} = Controller.tick(member.controller, percept(member, at_ms))
-    reflex = Reflex.wish(member.reflex, wish.twist, at_ms)
+    {member, []} = gate(member, {:cast, {:wish, wish.twist}}, at_ms)
     runner = Runner.walls(member.runner, Controller.walls(controller))
-    member = %{member | controller: controller, reflex: reflex, runner: runner}
+    member = %{member | controller: controller, runner: runner}
     {member, done} = ended(member, outcome)
     # The walls that the runner has just got are what {:walls, packed} tells a pilot.
     {member, effects} = handle(member, {:tick, Controller.percept(controller)})
@@ -172,7 +174,7 @@ defmodule Swarm.Member do
     {member, look(wish.look) ++ done ++ effects ++ beats}
   end
 
-  def step(member, {:reflex, at_ms}), do: react(member, :now, at_ms)
+  def step(member, {:reflex, at_ms}), do: gate(member, :tick, at_ms)
 
   @doc """
   The same as `step/2` for a message that was checked before (`Swarm.Message.check/1`): once for all members that hear it.
@@ -224,12 +226,17 @@ defmodule Swarm.Member do
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
     do: latch(member, EStop.State.hear(member.stop, beat.estop), at_ms)
 
-  defp react(member, :later, _at_ms), do: {member, []}
+  # What the gate tells others is not of interest here.
+  defp gate(member, input, at_ms) do
+    {gate, effects} = Gate.handle(input, at_ms, member.gate, member.entries)
 
-  defp react(member, :now, at_ms) do
-    {twist, limits, reflex} = Reflex.step(member.reflex, at_ms)
-    member = put(%{member | reflex: reflex}, :driving, %{twist: twist, limits: limits}, at_ms)
-    {member, [{:drive, twist}]}
+    Enum.reduce(effects, {%{member | gate: gate}, []}, fn
+      {:drive, twist, limits}, {member, out} ->
+        {put(member, :driving, %{twist: twist, limits: limits}, at_ms), out ++ [{:drive, twist}]}
+
+      _inside, done ->
+        done
+    end)
   end
 
   defp put(member, key, value, at_ms),
@@ -263,8 +270,7 @@ defmodule Swarm.Member do
          %{held: [_ | _]} = stop,
          at_ms
        ) do
-    member = %{member | reflex: Reflex.estop(member.reflex), stop: stop}
-    {member, stopped} = react(member, :now, at_ms)
+    {member, stopped} = gate(%{member | stop: stop}, {:cast, {:latch, nil}}, at_ms)
     {member, forgotten} = halt(member, at_ms)
     {member, stopped ++ forgotten}
   end
@@ -272,10 +278,9 @@ defmodule Swarm.Member do
   defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
 
   defp halt(member, at_ms) do
-    {reflex, urgency} = Reflex.forget(member.reflex)
     controller = Controller.stand(member.controller)
-    runner = Runner.halt(member.runner)
-    react(%{member | controller: controller, reflex: reflex, runner: runner}, urgency, at_ms)
+    member = %{member | controller: controller, runner: Runner.halt(member.runner)}
+    gate(member, {:cast, {:forget, nil}}, at_ms)
   end
 
   # The outcome first, so that the mission knows the result of its goal when it sees the next

@@ -288,12 +288,19 @@ defmodule Robot.Control.Executive do
   defp look(%{config: %{ptz: ptz}} = s, pan, _at_ms) when pan == nil or ptz == nil, do: s
 
   defp look(%{config: %{dry_run: true}} = s, pan, at_ms),
-    do: %{s | told: DryRun.tell(s.config.id, {:look, pan}, s.told, at_ms)}
+    do: told(s, DryRun.tell(s.config.id, {:look, pan}, s.told), at_ms)
 
   defp look(%{config: config} = s, pan, at_ms) do
     Device.look(Names.via(config.id, :ptz), pan * 1.0, 0.0)
     Trace.effect(config, :executive, {:look, pan}, at_ms)
     s
+  end
+
+  defp told(s, {effects, line}, at_ms) do
+    for {:event, name, about} <- effects,
+        do: Event.execute(name, %{at_ms: at_ms}, Map.put(about, :robot, s.config.id))
+
+    %{s | told: line}
   end
 
   defp tell(%{sink: {m, f, a}} = s, event, at_ms) do

@@ -114,8 +114,15 @@ defmodule Robot.Recording.Topics do
   defp said(robot, _id, {:gate, :effect, {:drive, %Twist{} = twist, limits}}, _at_ms, _ns),
     do: {%{robot | driving: {twist, limits}}, []}
 
-  defp said(robot, id, {:gate, :input, what}, _at_ms, ns) when what in [:estop, :reset],
-    do: {robot, [log(ns, :warning, id, "#{what}")]}
+  defp said(robot, id, {:gate, :input, {:ask, nil, what}}, _at_ms, ns)
+       when what in [:estop, :reset],
+       do: {robot, [log(ns, :warning, id, "#{what}")]}
+
+  defp said(robot, id, {:gate, :input, {:cast, {:latch, _then}}}, _at_ms, ns),
+    do: {robot, [log(ns, :warning, id, "estop")]}
+
+  defp said(robot, id, {:gate, :input, {:cast, {:unlatch, _presses, _about}}}, _at_ms, ns),
+    do: {robot, [log(ns, :warning, id, "reset")]}
 
   defp said(robot, _id, {:pilot, :effect, {:goal, _tag, goal}}, _at_ms, _ns),
     do: {%{robot | goal: goal_pose(goal)}, []}

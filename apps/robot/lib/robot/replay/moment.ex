@@ -94,19 +94,16 @@ defmodule Robot.Replay.Moment do
   end
 
   @doc "The parts of two states that differ, each side by the names of the parts."
-  @spec parted({struct(), map()}, {struct(), map()}) :: {keyword(), keyword()}
-  def parted({one, _} = recorded, {other, _} = replayed) do
+  @spec parted(Robot.Trace.state(), Robot.Trace.state()) :: {keyword(), keyword()}
+  def parted({one, facts}, {other, facts}), do: parted(one, other)
+  def parted({_one, facts}, {_other, others}), do: {[facts: facts], [facts: others]}
+
+  def parted(one, other) do
     keys =
       for {key, value} <- Enum.sort(Map.from_struct(one)),
           Map.get(other, key) !== value,
           do: key
 
-    case keys do
-      [] ->
-        {[facts: elem(recorded, 1)], [facts: elem(replayed, 1)]}
-
-      keys ->
-        {for(k <- keys, do: {k, Map.get(one, k)}), for(k <- keys, do: {k, Map.get(other, k)})}
-    end
+    {for(k <- keys, do: {k, Map.get(one, k)}), for(k <- keys, do: {k, Map.get(other, k)})}
   end
 end

@@ -6,15 +6,16 @@ defmodule Robot.Replay.Roles do
   alias Robot.Control.Controller
   alias Robot.Mission.Runner
   alias Robot.Navigation.Grid
-  alias Robot.Safety.Reflex
+  alias Robot.Safety.Gate
+  alias Robot.Trace
   import Robot.Mission, only: [is_order: 1]
 
   @typedoc "The state of a role, and what it needs to know besides (`Robot.Trace`)."
-  @type t :: {struct(), map()}
+  @type t :: Gate.t() | {struct(), map()}
   @type result :: {t(), effects :: [term()]}
 
   @states [
-    gate: {Reflex, :dry_run},
+    gate: Gate,
     executive: {Controller, :looks},
     pilot: {Runner, :state}
   ]
@@ -24,7 +25,7 @@ defmodule Robot.Replay.Roles do
   the form that it has in this version of the program.
 
       iex> alias Robot.Replay.Roles
-      iex> {Roles.entry?(:gate, :input, :step), Roles.entry?(:head, :input, :step)}
+      iex> {Roles.entry?(:gate, :input, :tick), Roles.entry?(:head, :input, :tick)}
       {true, false}
       iex> {Roles.entry?(:gate, :lost, 2), Roles.entry?(:gate, :begin, {%{}, %{}})}
       {true, false}
@@ -41,6 +42,8 @@ defmodule Robot.Replay.Roles do
 
   def entry?(_role, _kind, _what), do: false
 
+  defp state?(module, %module{} = state), do: Map.keys(state) == Map.keys(struct(module))
+
   defp state?({module, fact}, {%module{} = state, facts}) when is_map_key(facts, fact),
     do: Map.keys(state) == Map.keys(struct(module))
 
@@ -54,14 +57,14 @@ defmodule Robot.Replay.Roles do
   end
 
   def begin(:pilot, {%Runner{}, %{state: _state}} = state), do: {state, []}
-  def begin(:gate, {%Reflex{}, %{dry_run: _}} = state), do: {state, []}
+  def begin(:gate, %Gate{} = state), do: {state, []}
   def begin(:executive, {%Controller{}, %{looks: _}} = state), do: {state, []}
 
   @doc "What a role does on an input at this time of the robot's clock."
   @spec input(atom(), t(), term(), at_ms :: integer()) :: result()
-  def input(:gate, {reflex, facts}, what, at_ms) do
-    {reflex, effects} = gate(what, reflex, facts, at_ms)
-    {{reflex, facts}, effects}
+  def input(:gate, gate, input, at_ms) do
+    {gate, effects} = Gate.handle(input, at_ms, gate, %{})
+    {gate, Enum.filter(effects, &Trace.effect?/1)}
   end
 
   def input(:executive, {controller, facts}, what, _at_ms) do
@@ -70,23 +73,6 @@ defmodule Robot.Replay.Roles do
   end
 
   def input(:pilot, {runner, facts}, what, _at_ms), do: pilot(what, runner, facts)
-
-  defp gate({:wish, twist}, reflex, _facts, at_ms), do: {Reflex.wish(reflex, twist, at_ms), []}
-  defp gate(:forget, reflex, _facts, _at_ms), do: {elem(Reflex.forget(reflex), 0), []}
-  defp gate(:estop, reflex, _facts, _at_ms), do: {Reflex.estop(reflex), []}
-  defp gate(:reset, reflex, _facts, _at_ms), do: {Reflex.reset(reflex), []}
-
-  # That a reading asks for a step at once is seen by the step that follows.
-  defp gate({:sense, reading}, reflex, _facts, at_ms),
-    do: {elem(Reflex.sense(reflex, reading, at_ms), 0), []}
-
-  defp gate(:step, reflex, facts, at_ms) do
-    {twist, limits, reflex} = Reflex.step(reflex, at_ms)
-
-    if facts.dry_run,
-      do: {reflex, [{:drive, Hal.Twist.zero(), [:dry_run | limits]}]},
-      else: {reflex, [{:drive, twist, limits}]}
-  end
 
   defp executive({:tick, percept}, before, facts) do
     {wish, outcome, controller} = Controller.tick(before, percept)

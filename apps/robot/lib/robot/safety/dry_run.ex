@@ -21,19 +21,15 @@ defmodule Robot.Safety.DryRun do
   end
 
   @doc """
-  Reports what a robot would do now, unless the line equals `before`, the last one reported.
-  Returns the line.
+  The effects (`Robot.Role`) that report what a robot would do now, none if the line equals `before`, the last one
+  reported; and the line.
   """
-  @spec tell(atom(), command(), before :: String.t() | nil, integer()) :: String.t()
-  def tell(robot, command, before, at_ms) do
+  @spec tell(atom(), command(), before :: String.t() | nil) ::
+          {[Robot.Role.effect()], String.t()}
+  def tell(robot, command, before) do
     case line(robot, command) do
-      ^before ->
-        before
-
-      line ->
-        about = %{robot: robot, command: command, line: line}
-        Event.execute(@event, %{at_ms: at_ms}, about)
-        line
+      ^before -> {[], before}
+      line -> {[{:event, @event, %{command: command, line: line}}], line}
     end
   end
 

@@ -7,27 +7,32 @@ defmodule Robot.Safety.Gate do
   while the robot moves, the gate does not wait for the next step.
 
   The gate reads the e-stop latch at its start, so that a restart does not release it. Only
-  `reset/1` clears it. When the latch is set or cleared, the gate applies the config's
-  `:on_latch`, so that the process that spreads the stop is notified; with `tell: false`, which
-  that process itself uses, it does not.
+  `reset/1` clears it. When the latch is set or cleared directly, the gate tells the role `:estop`, which spreads the stop.
 
   While the drive is not armed (`Hal.Device.Arming`), the gate commands it only to stand, so that
   a robot starts from standing when a person arms it, and reports why it stands. In a dry run
   (`Robot.Safety.DryRun`) it also commands it only to stand, and reports what it would have
   commanded.
+
+  A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """
-  use Hal.HardenedServer
-  alias Hal.{Device, Event, HardenedServer, Ticker, Twist}
+  @behaviour Robot.Role
+  alias Hal.{HardenedServer, Twist}
   alias Robot.{Board, Names}
-  alias Robot.Trace
   alias Robot.Safety.{DryRun, Reflex}
 
-  @period_ms 50
+  @enforce_keys [:robot, :reflex, :dry_run, :presses]
+  defstruct @enforce_keys ++ [told: nil, limits: nil]
 
-  @doc "Starts the gate of a robot; it first commands the wheels to stop."
-  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
-  def start_link(%Robot.Config{} = config),
-    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :gate))
+  @typedoc "`presses` counts direct stops; `told` is the last line of a dry run, `limits` the last ones told."
+  @type t :: %__MODULE__{
+          robot: atom(),
+          reflex: Reflex.t(),
+          dry_run: boolean(),
+          presses: non_neg_integer(),
+          told: String.t() | nil,
+          limits: [Reflex.limit() | :dry_run] | nil
+        }
 
   @doc "Wishes a speed; the newest wish is valid for 200 ms."
   @spec wish(robot :: atom(), Twist.t()) :: :ok
@@ -52,156 +57,157 @@ defmodule Robot.Safety.Gate do
   @doc """
   Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
   the drive's device, and the latch is in its file, or the error says which file could not be written, and why
-  (`Robot.Board.saved/2`). The process that owns
-  the state of the e-stop sets the latch with `tell: false`: then the config's `:on_latch` is not
-  applied, and this does not wait for the file. Anybody else stops the gate directly, as `mix calibrate` does.
+  (`Robot.Board.saved/2`). The e-stop role is told. It uses `latch/2`, which waits for nothing; `mix calibrate` uses this.
   """
-  @spec estop(robot :: atom(), tell: boolean()) :: :ok | {:error, {Path.t(), File.posix()}}
-  def estop(robot, options \\ []),
-    do: GenServer.call(Names.via(robot, :gate), {:estop, Keyword.get(options, :tell, true)})
+  @spec estop(robot :: atom()) :: :ok | {:error, {Path.t(), File.posix()}}
+  def estop(robot), do: GenServer.call(Names.via(robot, :gate), :estop)
+
+  @doc "Clears the e-stop: wishes count again. The person who resets must have looked where the robot would go."
+  @spec reset(robot :: atom()) :: :ok
+  def reset(robot), do: GenServer.call(Names.via(robot, :gate), :reset)
 
   @doc """
-  Clears the e-stop: wishes count again. The person who resets must have looked where the robot
-  would go. `:tell` is as in `estop/2`. With `presses:` the reset applies to direct stops up to
-  that one (`presses/1`), and is refused if there was another one since.
+  Stops the robot until `unlatch/3`, for the e-stop role, which is not told, and does not wait: a gate that hangs delays
+  nothing else. Then applies `then`, if given.
   """
-  @spec reset(robot :: atom(), tell: boolean(), presses: non_neg_integer()) ::
-          :ok | {:error, :pressed}
-  def reset(robot, options \\ []) do
-    {tell?, presses} = {Keyword.get(options, :tell, true), options[:presses]}
-    GenServer.call(Names.via(robot, :gate), {:reset, tell?, presses})
-  end
+  @spec latch(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
+  def latch(robot, then \\ nil), do: GenServer.cast(Names.via(robot, :gate), {:latch, then})
 
-  @doc "How often the gate was stopped directly, by `estop/1` without `tell: false`; 0 if never."
-  @spec presses(Board.t()) :: non_neg_integer()
+  @doc """
+  Clears the e-stop for the e-stop role, unless the gate was stopped directly since it counted `presses`
+  (`presses/1`). The role is told `{:unlatched, :ok | {:error, :pressed}, about}`.
+  """
+  @spec unlatch(robot :: atom(), presses :: non_neg_integer(), about :: term()) :: :ok
+  def unlatch(robot, presses, about),
+    do: GenServer.cast(Names.via(robot, :gate), {:unlatch, presses, about})
+
+  @doc "How often the gate was stopped directly, by `estop/1`; 0 if never."
+  @spec presses(Board.t() | Board.entries()) :: non_neg_integer()
   def presses(board) do
-    with {:ok, presses, _at_ms} <- Board.fetch(board, :presses, :infinity),
+    with {:ok, presses, _at_ms} <- Board.fetch(board, :presses, :infinity, 0),
          do: presses,
          else: (:error -> 0)
   end
 
-  @impl GenServer
-  def init(%Robot.Config{id: id} = config) do
-    # A stop must not wait for the processes that communicate; the gate's own work is short.
-    Process.flag(:priority, :high)
-    drive = Names.via(id, :drive)
-    Device.drive(drive, Twist.zero())
-    board = Board.find!(id)
-    latched? = Board.latched?(board)
-    at_ms = Robot.Config.now(config)
-    if config.dry_run, do: DryRun.attach()
-    Event.execute([:robot, :gate, :start], %{at_ms: at_ms}, %{robot: id, latched?: latched?})
+  @impl Robot.Role
+  def name, do: :gate
 
-    s = %{
-      config: config,
-      board: board,
-      drive: drive,
-      reflex:
-        Reflex.new(config.profile,
-          latched?: latched?,
-          armed?: armed?(board, config),
-          fence: config.fence,
-          start: config.start,
-          frame: frame(board)
-        ),
-      told: nil,
-      limits: nil,
-      ticker: Robot.Config.ticker(config, :step, @period_ms)
+  @impl Robot.Role
+  def period_ms, do: 50
+
+  @impl Robot.Role
+  def init(%Robot.Config{} = config, board, _at_ms) do
+    latched? = Board.latched?(board)
+    if config.dry_run, do: DryRun.attach()
+
+    reflex =
+      Reflex.new(config.profile,
+        latched?: latched?,
+        armed?: armed?(board, config),
+        fence: config.fence,
+        start: config.start,
+        frame: frame(board)
+      )
+
+    state = %__MODULE__{
+      robot: config.id,
+      reflex: reflex,
+      dry_run: config.dry_run,
+      presses: presses(board)
     }
 
-    Trace.begin(config, :gate, state(s), at_ms)
-    {:ok, step(s, at_ms)}
+    # Its first tick, at once, has no wish: it stops the wheels.
+    {state, [{:event, [:robot, :gate, :start], %{latched?: latched?}}, :tick]}
   end
 
-  @impl GenServer
-  def handle_cast({:wish, twist}, s) do
-    at_ms = heard(s, {:wish, twist})
-    {:noreply, %{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}}
+  @impl Robot.Role
+  def handle(:tick, at_ms, s, _board), do: step(s, at_ms)
+
+  def handle({:cast, {:wish, twist}}, at_ms, s, _board),
+    do: {%{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}, []}
+
+  def handle({:cast, {:forget, then}}, at_ms, s, _board) do
+    if HardenedServer.then?(then) do
+      {reflex, urgency} = Reflex.forget(s.reflex)
+      {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
+      {s, effects ++ applied(then)}
+    else
+      :unknown
+    end
   end
 
-  def handle_cast({:forget, then}, s) do
-    if HardenedServer.then?(then),
-      do: {:noreply, forgotten(s, then)},
-      else: HardenedServer.drop(s)
-  end
+  def handle({:cast, {:sense, {:arming, _state}}}, _at_ms, %{dry_run: true} = s, _board),
+    do: {s, []}
 
-  def handle_cast({:sense, {:arming, _state}}, %{config: %{dry_run: true}} = s),
-    do: {:noreply, s}
-
-  def handle_cast({:sense, reading}, s) do
-    at_ms = heard(s, {:sense, reading})
+  def handle({:cast, {:sense, reading}}, at_ms, s, _board) do
     {reflex, urgency} = Reflex.sense(s.reflex, reading, at_ms)
-    {:noreply, s |> frame(reflex, at_ms) |> react(urgency, at_ms)}
+    noted = framed(Reflex.frame(s.reflex), Reflex.frame(reflex))
+    {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
+    {s, noted ++ effects}
   end
 
-  @impl GenServer
-  def handle_call({:estop, tell?}, from, s) when is_boolean(tell?) do
-    at_ms = heard(s, :estop)
-    Board.latch(s.board)
-    if tell?, do: Board.put(s.board, :gate, :presses, presses(s.board) + 1, at_ms)
-    s = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
-    if tell?, do: tell_latch(s)
-    Event.execute([:robot, :gate, :estop], %{at_ms: at_ms}, %{robot: s.config.id})
-    # Whoever stops it directly may wait for a disk; these steps do not.
-    if tell?,
-      do: Board.saved(s.board, {GenServer, :reply, [from]}),
-      else: GenServer.reply(from, :ok)
-
-    {:noreply, s}
+  def handle({:cast, {:latch, then}}, at_ms, s, _board) do
+    if HardenedServer.then?(then) do
+      {s, effects} = if Reflex.latched?(s.reflex), do: {s, []}, else: latched(s, at_ms)
+      {s, effects ++ applied(then)}
+    else
+      :unknown
+    end
   end
 
-  def handle_call({:reset, tell?, presses}, _from, s)
-      when is_boolean(tell?) and (presses == nil or is_integer(presses)) do
-    if presses != nil and presses(s.board) > presses,
-      do: {:reply, {:error, :pressed}, s},
-      else: {:reply, :ok, cleared(s, tell?)}
+  def handle({:cast, {:unlatch, presses, about}}, _at_ms, s, _board) when is_integer(presses) do
+    if s.presses > presses do
+      {s, [{:cast, :estop, {:unlatched, {:error, :pressed}, about}}]}
+    else
+      {s, effects} = unlatched(s)
+      {s, effects ++ [{:cast, :estop, {:unlatched, :ok, about}}]}
+    end
   end
 
-  defp forgotten(s, then) do
-    at_ms = heard(s, :forget)
-    {reflex, urgency} = Reflex.forget(s.reflex)
-    s = react(%{s | reflex: reflex}, urgency, at_ms)
-    with {m, f, a} <- then, do: apply(m, f, a)
-    s
+  def handle({:ask, from, :estop}, at_ms, s, _board) do
+    presses = s.presses + 1
+    {s, effects} = latched(%{s | presses: presses}, at_ms)
+    {s, [{:put, :presses, presses} | effects] ++ [{:cast, :estop, :latch}, {:answer_saved, from}]}
   end
 
-  defp cleared(s, tell?) do
-    at_ms = heard(s, :reset)
-    Board.unlatch(s.board)
-    if tell?, do: tell_latch(s)
-    Event.execute([:robot, :gate, :reset], %{at_ms: at_ms}, %{robot: s.config.id})
-    %{s | reflex: Reflex.reset(s.reflex)}
+  def handle({:ask, from, :reset}, _at_ms, s, _board) do
+    {s, effects} = unlatched(s)
+    {s, effects ++ [{:cast, :estop, :latch}, {:answer, from, :ok}]}
   end
 
-  @impl GenServer
-  def handle_info(:step, s) do
-    at_ms = Robot.Config.now(s.config)
-    Trace.checkpoint(s.config, :gate, fn -> state(s) end, at_ms)
-    {:noreply, s |> step(at_ms) |> schedule()}
+  def handle(_unknown, _at_ms, _s, _board), do: :unknown
+
+  # The latch first: whatever becomes of this role, its successor is latched.
+  defp latched(s, at_ms) do
+    {s, effects} = step(%{s | reflex: Reflex.estop(s.reflex)}, at_ms)
+    {s, [{:latch, true} | effects] ++ [{:event, [:robot, :gate, :estop], %{}}]}
   end
 
-  defp state(s), do: {s.reflex, %{dry_run: s.config.dry_run}}
+  defp unlatched(s) do
+    {%{s | reflex: Reflex.reset(s.reflex)},
+     [{:latch, false}, {:event, [:robot, :gate, :reset], %{}}]}
+  end
+
+  defp applied(nil), do: []
+  defp applied(then), do: [{:apply, then}]
 
   # In a dry run the drive is never armed, but the report shows what an armed robot would do.
   defp armed?(_board, %{dry_run: true}), do: true
 
   # Before the drive has reported its state, the config decides.
   defp armed?(board, config) do
-    case Board.fetch(board, :arming, :infinity) do
+    case Board.fetch(board, :arming, :infinity, 0) do
       {:ok, %{state: state}, _at_ms} -> state == :armed
       :error -> config.arm == :auto
     end
   end
 
   # After a crash, the new gate must not take another frame for the frame of its fence.
-  defp frame(s, reflex, at_ms) do
-    frame = Reflex.frame(reflex)
-    if frame != Reflex.frame(s.reflex), do: Board.put(s.board, :gate, :frame, frame, at_ms)
-    %{s | reflex: reflex}
-  end
+  defp framed(frame, frame), do: []
+  defp framed(_before, frame), do: [{:put, :frame, frame}]
 
   defp frame(board) do
-    with :error <- Board.fetch(board, :frame, :infinity) do
+    with :error <- Board.fetch(board, :frame, :infinity, 0) do
       departed = Board.departed(board)
       if departed, do: {:was, departed}
     else
@@ -210,38 +216,23 @@ defmodule Robot.Safety.Gate do
   end
 
   defp react(s, :now, at_ms), do: step(s, at_ms)
-  defp react(s, :later, _at_ms), do: s
+  defp react(s, :later, _at_ms), do: {s, []}
 
   defp step(s, at_ms) do
-    Trace.input(s.config, :gate, :step, at_ms)
     {wanted, limits, reflex} = Reflex.step(s.reflex, at_ms)
-    {twist, limits, s} = rehearse(wanted, limits, s, at_ms)
-    Device.drive(s.drive, twist)
-    Board.put(s.board, :gate, :driving, %{twist: twist, limits: limits}, at_ms)
-    Trace.effect(s.config, :gate, {:drive, twist, limits}, at_ms)
+    {twist, limits, rehearsed, told} = rehearse(s, wanted, limits)
+    drive = [{:drive, twist, limits} | rehearsed]
 
-    if limits != s.limits do
-      about = %{robot: s.config.id, limits: limits}
-      Event.execute([:robot, :gate, :limits], %{at_ms: at_ms}, about)
-    end
+    changed =
+      if limits == s.limits, do: [], else: [{:event, [:robot, :gate, :limits], %{limits: limits}}]
 
-    %{s | reflex: reflex, limits: limits}
+    {%{s | reflex: reflex, told: told, limits: limits}, drive ++ changed}
   end
 
-  defp rehearse(twist, limits, %{config: %{dry_run: false}} = s, _at_ms), do: {twist, limits, s}
+  defp rehearse(%{dry_run: false} = s, twist, limits), do: {twist, limits, [], s.told}
 
-  defp rehearse(twist, limits, s, at_ms) do
-    told = DryRun.tell(s.config.id, {:drive, twist, limits}, s.told, at_ms)
-    {Twist.zero(), [:dry_run | limits], %{s | told: told}}
-  end
-
-  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
-
-  defp tell_latch(s), do: with({m, f, a} <- s.config.on_latch, do: apply(m, f, a))
-
-  defp heard(s, what) do
-    at_ms = Robot.Config.now(s.config)
-    Trace.input(s.config, :gate, what, at_ms)
-    at_ms
+  defp rehearse(s, twist, limits) do
+    {effects, told} = DryRun.tell(s.robot, {:drive, twist, limits}, s.told)
+    {Twist.zero(), [:dry_run | limits], effects, told}
   end
 end

@@ -136,6 +136,10 @@ defmodule Robot.Safety.Reflex do
   @spec frame(t()) :: fence_frame()
   def frame(%__MODULE__{frame: frame}), do: frame
 
+  @doc "Whether the e-stop is latched."
+  @spec latched?(t()) :: boolean()
+  def latched?(%__MODULE__{latched?: latched?}), do: latched?
+
   @doc "Takes a wish, any term; one without sensible numbers counts as a wish to stop."
   @spec wish(t(), Twist.t() | term(), integer()) :: t()
   def wish(%__MODULE__{latched?: true} = reflex, _twist, _at_ms), do: reflex

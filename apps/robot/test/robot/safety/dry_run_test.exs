@@ -63,8 +63,11 @@ defmodule Robot.Safety.DryRunTest do
   end
 
   test "what changes by less than a person sees is not told" do
-    first = DryRun.tell(:dry3, {:drive, Twist.new(0.3, 0.0), []}, nil, 0)
-    assert DryRun.tell(:dry3, {:drive, Twist.new(0.301, 0.001), []}, first, 50) == first
-    assert DryRun.tell(:dry3, {:drive, Twist.new(0.32, 0.0), []}, first, 50) != first
+    {[{:event, [:robot, :dry_run], %{line: first}}], first} =
+      DryRun.tell(:dry3, {:drive, Twist.new(0.3, 0.0), []}, nil)
+
+    assert DryRun.tell(:dry3, {:drive, Twist.new(0.301, 0.001), []}, first) == {[], first}
+    assert {[_told], other} = DryRun.tell(:dry3, {:drive, Twist.new(0.32, 0.0), []}, first)
+    assert other != first
   end
 end

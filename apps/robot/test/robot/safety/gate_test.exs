@@ -8,10 +8,9 @@ defmodule Robot.Safety.GateTest do
   # What the gate did next, in the order of its own trace.
   defp after_sense(reading) do
     receive do
-      {:gate, :input, {:sense, ^reading}, at_ms} ->
-        assert_receive {:gate, kind1, what1, ^at_ms}
-        assert_receive {:gate, kind2, what2, ^at_ms}
-        [{kind1, what1, at_ms}, {kind2, what2, at_ms}]
+      {:gate, :input, {:cast, {:sense, ^reading}}, at_ms} ->
+        assert_receive {:gate, kind, what, ^at_ms}
+        {kind, what}
 
       {:gate, _kind, _what, _at_ms} ->
         after_sense(reading)
@@ -25,8 +24,7 @@ defmodule Robot.Safety.GateTest do
     rolls()
     send(Names.whereis(id, :drive), {:readings, [reading]})
 
-    assert [{:input, :step, at_ms}, {:effect, {:drive, twist, limits}, at_ms}] =
-             after_sense(reading)
+    assert {:effect, {:drive, twist, limits}} = after_sense(reading)
 
     {twist.linear, limits}
   end
@@ -85,7 +83,7 @@ defmodule Robot.Safety.GateTest do
     for _step <- 1..5, do: assert_receive({:drive, {:drive, twist}, _} when twist == @zero)
     assert Gate.reset(id) == :ok
     rolls()
-    assert Gate.estop(id, tell: false) == :ok
+    assert Gate.latch(id) == :ok
     stands(250)
     refute Board.saved?(Board.find!(id))
     assert Task.yield(answer, 0) == nil
@@ -111,13 +109,13 @@ defmodule Robot.Safety.GateTest do
 
     tell.(frame = make_ref())
     assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
-    assert %{reflex: %{place: {_pose, _at_ms}}} = :sys.get_state(Names.via(id, :gate))
+    assert %{state: %{reflex: %{place: {_pose, _at_ms}}}} = :sys.get_state(Names.via(id, :gate))
     listen(id, [:robot, :gate, :start])
     kill(id, :gate)
     assert_receive {[:robot, :gate, :start], _}
     tell.(make_ref())
     assert {:ok, {:is, ^frame}, _} = Board.fetch(board, :frame, :infinity)
-    assert %{reflex: %{place: nil}} = :sys.get_state(Names.via(id, :gate))
+    assert %{state: %{reflex: %{place: nil}}} = :sys.get_state(Names.via(id, :gate))
   end
 
   test "a gate that starts again knows that its drive is not armed" do

@@ -99,6 +99,7 @@ defmodule Swarm.EStop.Actions do
       follow(s)
     else
       release(s, {ref, given_us})
+      s
     end
   end
 
@@ -168,20 +169,22 @@ defmodule Swarm.EStop.Actions do
     become(s, stop)
   end
 
-  @doc "Releases the gate, by a reset that was given then, and answers it."
-  @spec release(t(), {reference(), given_us :: integer()}) :: t()
-  def release(s, {ref, given_us}) do
-    case Gate.reset(s.id, tell: false, presses: s.presses) do
-      :ok ->
-        s = reset(s, given_us)
-        Nonblocking.answer(ref, :ok)
-        s
+  @doc "Releases the gate, by a reset that was given then; the gate answers with `{:unlatched, result, about}`."
+  @spec release(t(), {reference(), given_us :: integer()}) :: :ok
+  def release(s, about), do: Gate.unlatch(s.id, s.presses, {s.pressed, about})
 
-      # The gate's report of a direct stop is on the way.
-      {:error, :pressed} ->
-        EStop.Answer.stopped_again(s.id, ref)
-        s
-    end
+  @doc "Answers a reset by what the gate has answered."
+  @spec released(t(), :ok | {:error, :pressed}, {reference(), {reference(), integer()}}) :: t()
+  def released(%{pressed: pressed} = s, :ok, {pressed, {ref, given_us}}) do
+    s = reset(s, given_us)
+    Nonblocking.answer(ref, :ok)
+    s
+  end
+
+  # Stopped again meanwhile: the gate was latched again after the reset, or its report of a direct stop is on the way.
+  def released(s, _result, {_pressed, {ref, _given_us}}) do
+    EStop.Answer.stopped_again(s.id, ref)
+    s
   end
 
   defp reset(s, given_us) do
@@ -221,12 +224,10 @@ defmodule Swarm.EStop.Actions do
     s
   end
 
-  @doc "Latches the gate if the stop is set and the gate is not latched."
+  @doc "Latches the gate if the stop is set. A reset that is on its way to the gate comes before this."
   @spec hold(t()) :: t()
   def hold(s) do
-    if EStop.State.held?(s.stop) and not Board.latched?(s.board),
-      do: :ok = Gate.estop(s.id, tell: false)
-
+    if EStop.State.held?(s.stop), do: Gate.latch(s.id)
     s
   end
 

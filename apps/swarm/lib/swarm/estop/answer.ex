@@ -3,7 +3,7 @@ defmodule Swarm.EStop.Answer do
   # Answers for a gate that has carried out a stop, to the e-stop process or to the caller.
   alias Hal.Device
   alias Robot.{Board, Names}
-  alias Robot.Safety.Readiness
+  alias Robot.Safety.{Gate, Readiness}
   alias Mesh.Nonblocking
 
   @doc """
@@ -27,14 +27,18 @@ defmodule Swarm.EStop.Answer do
   def stood(robot, ref), do: confirm(robot, {Nonblocking, :answer, [ref]})
 
   @doc """
-  The same by the e-stop process (the caller) when it has latched the gate: `:ok` also says that the latch is in its
-  file, if it has one. If the disk takes too long, `{:unsaved, ref}` comes to the e-stop process in time for `unsaved/3`.
+  The same for an e-stop, once the gate is latched: `:ok` also says that the latch is in its file, if it has one. If gate
+  or disk take too long, `{:unsaved, ref}` comes to the e-stop process (the caller) in time for `unsaved/3`.
   """
   @spec held(atom(), reference()) :: :ok
   def held(robot, ref) do
     Process.send_after(self(), {:unsaved, ref}, @saved_ms)
-    confirm(robot, {__MODULE__, :save, [robot, ref]})
+    Gate.latch(robot, {__MODULE__, :latched, [robot, ref]})
   end
+
+  @doc "Called by the gate when it is latched."
+  @spec latched(atom(), reference()) :: :ok
+  def latched(robot, ref), do: confirm(robot, {__MODULE__, :save, [robot, ref]})
 
   @doc "Answers an e-stop, as soon as its file is written if the answer is `:ok`."
   @spec save(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
@@ -55,15 +59,23 @@ defmodule Swarm.EStop.Answer do
     Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
   end
 
-  @doc "Answers an e-stop whose file is not written yet; nobody hears it after another answer."
+  @doc "Answers an e-stop that took too long; nobody hears it after another answer."
   @spec unsaved(atom(), Board.t(), reference()) :: :ok
   def unsaved(robot, board, ref) do
-    why =
-      "its disk has not taken the e-stop yet, which would not survive a restart of the machine"
+    cond do
+      not Board.latched?(board) ->
+        why = "its gate does not answer, and the drive stops by itself if nothing comes from it"
+        Nonblocking.answer(ref, {:error, "#{robot} is told to stop, but #{why}"})
 
-    if Board.saved?(board),
-      do: :ok,
-      else: Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
+      Board.saved?(board) ->
+        :ok
+
+      true ->
+        why =
+          "its disk has not taken the e-stop yet, which would not survive a restart of the machine"
+
+        Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
+    end
   end
 
   defp confirm(robot, {m, f, a} = then) do

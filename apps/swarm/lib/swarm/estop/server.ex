@@ -82,9 +82,8 @@ defmodule Swarm.EStop.Server do
   # Nobody else knows this reference.
   def handle_cast({:release, pressed, ref, given_us}, %{pressed: pressed} = s)
       when is_reference(ref) and is_integer(given_us) do
-    if EStop.Actions.waits?(given_us),
-      do: {:noreply, EStop.Actions.release(s, {ref, given_us})},
-      else: {:noreply, s}
+    if EStop.Actions.waits?(given_us), do: EStop.Actions.release(s, {ref, given_us})
+    {:noreply, s}
   end
 
   def handle_cast({:release, pressed, ref, _given_us}, s)
@@ -92,6 +91,10 @@ defmodule Swarm.EStop.Server do
     EStop.Answer.stopped_again(s.id, ref)
     {:noreply, s}
   end
+
+  def handle_cast({:unlatched, result, {pressed, {ref, given_us}} = about}, s)
+      when is_reference(pressed) and is_reference(ref) and is_integer(given_us),
+      do: {:noreply, EStop.Actions.released(s, result, about)}
 
   def handle_cast({:stamp, ref}, s) when is_reference(ref) do
     Nonblocking.answer(ref, Freshness.stamp(s.life, System.monotonic_time(:microsecond)))

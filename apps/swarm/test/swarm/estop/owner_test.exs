@@ -137,6 +137,20 @@ defmodule Swarm.EStop.OwnerTest do
     assert stop_of(id).held == held
   end
 
+  test "an e-stop ends the mission, is passed on, and is answered while the gate hangs" do
+    [id, near] = for id <- [:owner_hung, :owner_hung_near], do: robot(id)
+    :ok = Swarm.tell(id, "move:0.2:0")
+    gate = Names.whereis(id, :gate)
+    :ok = :sys.suspend(gate)
+    {:error, line} = Swarm.ask(id, :estop)
+    assert line =~ "#{id} is told to stop, but its gate does not answer"
+    assert {:ok, %{state: :idle}, _at_ms} = Board.fetch(Board.find!(id), :mission, :infinity)
+    assert latched?(near)
+    # The one that follows is latched by what was written down.
+    ^gate = kill(id, :gate)
+    eventually(fn -> Names.whereis(id, :gate) not in [nil, gate] and latched?(id) end)
+  end
+
   test "the comms process does not wait for an e-stop process that hangs, and passes on only changes" do
     id = robot(:owner_hangs, comms: [transport: {__MODULE__, :carry, [self()]}])
     standing([id])
