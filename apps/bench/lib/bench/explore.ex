@@ -73,7 +73,7 @@ defmodule Bench.Explore do
 
     off =
       for id <- Trial.living(trial) do
-        believed = Trial.robot(trial, id).controller.percept.pose
+        believed = Trial.robot(trial, id).executive.controller.percept.pose
         Pose.distance(believed, Sim.World.truth(trial.world, id))
       end
 

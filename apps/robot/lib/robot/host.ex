@@ -6,6 +6,9 @@ defmodule Robot.Host do
   use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Ticker}
   alias Robot.{Board, Names, Trace}
+  alias Robot.Control.Crash
+
+  @slow_us 50_000
 
   @doc "The process of a role as a child of the robot's supervisor."
   @spec child_spec({module(), Robot.Config.t()}) :: Supervisor.child_spec()
@@ -15,8 +18,7 @@ defmodule Robot.Host do
   @doc "Starts the process of a role. The robot's board must be running."
   @spec start_link({module(), Robot.Config.t()}) :: GenServer.on_start()
   def start_link({role, %Robot.Config{id: id}} = arg) do
-    # A stop must not wait for the processes that communicate; a role's own work is short.
-    options = [name: Names.via(id, role.name()), spawn_opt: [priority: :high]]
+    options = [name: Names.via(id, role.name()), spawn_opt: [priority: role.priority()]]
     HardenedServer.start_link(__MODULE__, arg, options)
   end
 
@@ -26,9 +28,19 @@ defmodule Robot.Host do
     at_ms = Robot.Config.now(config)
     {state, effects} = role.init(config, board, at_ms)
     ticker = Robot.Config.ticker(config, :tick, role.period_ms())
-    s = %{role: role, config: config, board: board, state: state, ticker: ticker}
+
+    s = %{
+      role: role,
+      perceives?: function_exported?(role, :perceive, 3),
+      config: config,
+      board: board,
+      state: state,
+      ticker: ticker
+    }
+
     Trace.begin(config, role.name(), state, at_ms)
-    {:ok, carry_out(effects, s, at_ms)}
+    # Not recorded: they follow from no input.
+    {:ok, Enum.reduce(effects, s, &carry_out_one(&1, &2, at_ms))}
   end
 
   @impl GenServer
@@ -39,9 +51,17 @@ defmodule Robot.Host do
 
   @impl GenServer
   def handle_info(:tick, s) do
+    begun_us = System.monotonic_time(:microsecond)
     at_ms = Robot.Config.now(s.config)
     Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
-    s = hand(:tick, s, at_ms)
+    s = tick(s, at_ms)
+    took_us = System.monotonic_time(:microsecond) - begun_us
+
+    if took_us > @slow_us do
+      measured = %{at_ms: Robot.Config.now(s.config), duration_ms: div(took_us, 1_000)}
+      Event.execute([:robot, s.role.name(), :slow], measured, %{robot: s.config.id})
+    end
+
     {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
   end
 
@@ -54,11 +74,20 @@ defmodule Robot.Host do
     end
   end
 
-  defp hand(input, s, at_ms),
-    do: handled(input, s.role.handle(input, at_ms, s.state, s.board), s, at_ms)
+  # Behaviours may be foreign code.
+  defp tick(s, at_ms) do
+    input = if s.perceives?, do: s.role.perceive(at_ms, s.state, s.board), else: :tick
 
+    Crash.told(s.config, s.board, s.role.name(), fn ->
+      handled(input, s.role.handle(input, at_ms, s.state, s.board), s, at_ms)
+    end)
+  end
+
+  # What was refused, by what the board said then, has changed nothing and is not recorded.
   defp handled(input, {state, effects}, s, at_ms) do
-    Trace.input(s.config, s.role.name(), recorded(input), at_ms)
+    if state !== s.state or Enum.any?(effects, &Trace.effect?/1),
+      do: Trace.input(s.config, s.role.name(), recorded(input), at_ms)
+
     carry_out(effects, %{s | state: state}, at_ms)
   end
 
@@ -72,7 +101,7 @@ defmodule Robot.Host do
     end)
   end
 
-  defp carry_out_one(:tick, s, at_ms), do: hand(:tick, s, at_ms)
+  defp carry_out_one(:tick, s, at_ms), do: tick(s, at_ms)
 
   defp carry_out_one(effect, s, at_ms) do
     act(effect, s, at_ms)
@@ -84,8 +113,13 @@ defmodule Robot.Host do
     act({:put, :driving, %{twist: twist, limits: limits}}, s, at_ms)
   end
 
+  defp act({:look, pan}, s, _at_ms), do: Device.look(Names.via(s.config.id, :ptz), pan * 1.0, 0.0)
+
   defp act({:put, key, value}, s, at_ms),
     do: Board.put(s.board, s.role.name(), key, value, at_ms)
+
+  defp act({:delete, key}, s, _at_ms), do: Board.delete(s.board, s.role.name(), key)
+  defp act({:depart, frame}, s, _at_ms), do: Board.depart(s.board, frame)
 
   defp act({:latch, true}, s, _at_ms), do: Board.latch(s.board)
   defp act({:latch, false}, s, _at_ms), do: Board.unlatch(s.board)

@@ -46,7 +46,7 @@ defmodule Robot.Supervisor do
       {Devices, config},
       {Host, {Gate, config}},
       {LivenessMonitor, config},
-      {Executive, {config, {Pilot, :hear, [config.id]}}},
+      {Host, {Executive, config}},
       {Pilot, config}
     ]
 

@@ -6,30 +6,27 @@ defmodule Robot.Trace do
   The config's `:trace` is called as `apply(m, f, a ++ [{role, kind, what, at_ms}])`, in the
   process of that role. The inputs (`:input`) and effects (`:effect`) are
 
-    * `:gate` - the inputs of its role (`Robot.Role`), and of its effects those of `effect?/1`
-    * `:executive` - in: `{:goal, tag, goal}`, `:stand`, `{:anchors, anchors}`, `{:look, pan}`,
-      `{:tick, raw percept}`; out: `{:wish, wish}`, `{:look, pan}`, `{:walls, packed}`, `{:tick, percept}`,
-      `{:outcome, tag, integer}`
+    * `:gate`, `:executive` - the inputs of a role (`Robot.Role`), and of its effects those of `effect?/1`
     * `:pilot` - in: `{:start, module, options}`, `:stop`, `:resume`, `{:walls, packed}`, and the events of
       `Robot.Mission`; out: `{:phase, state}` and the effects of `Robot.Mission`
 
   An entry of the kind `:begin` has `state` or `{state, facts}`: with what the process starts, also after a
   crash. One of the kind `:checkpoint` has a function that returns the same, of now. It is offered
   at each tick or step, between two inputs; whoever wants one calls the function at once, in the
-  process that offers it. That of the gate is its role's; those of the others are `Robot.Control.Controller` and
-  `Robot.Mission.Runner` with facts that say what else the effects depend on:
+  process that offers it. That of a role is the role's; that of the pilot is a `Robot.Mission.Runner` with facts that say
+  what else the effects depend on:
 
-    * `:executive` - `looks`: whether there is a head that may turn
     * `:pilot` - `state`: what it published last, `:idle` or `{mission, phase}`; `nil` at a start
   """
 
   @type kind :: :begin | :checkpoint | :input | :effect
   @type entry :: {role :: atom(), kind(), what :: term(), at_ms :: integer()}
-  @type state :: Robot.Role.state() | {Robot.Control.Controller.t() | struct(), map()}
+  @type state :: Robot.Role.state() | {struct(), map()}
 
   @doc "Whether an effect of a role is recorded: what others get."
   @spec effect?(Robot.Role.effect()) :: boolean()
   def effect?({:drive, _twist, _limits}), do: true
+  def effect?({:look, _pan}), do: true
   def effect?({:cast, _role, _message}), do: true
   def effect?(_inside), do: false
 

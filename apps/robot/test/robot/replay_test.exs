@@ -2,7 +2,7 @@ defmodule Robot.ReplayTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Behaviour.Move
-  alias Robot.Control.Controller
+  alias Robot.Control.{Controller, Executive}
   alias Robot.Mission.{Manual, Runner}
   alias Robot.{Percept, Recording, Replay}
   alias Robot.Replay.Roles
@@ -19,15 +19,17 @@ defmodule Robot.ReplayTest do
     def handle(_event, count), do: {:ready, count + 1, [{:stage, :heard, %{count: count}}]}
   end
 
-  defp begun(more \\ []) do
+  defp begun(more \\ []), do: begun(Gate, more)
+
+  defp begun(role, more) do
     config =
       struct!(
         Robot.Config,
         [id: :mag1, profile: Profile.magellan(), drive: {Some.Drive, []}] ++ more
       )
 
-    {gate, _effects} = Gate.init(config, %{}, 0)
-    gate
+    {state, _effects} = role.init(config, %{}, 0)
+    state
   end
 
   # What a process of this role records for these inputs, one a 50 ms.
@@ -151,21 +153,19 @@ defmodule Robot.ReplayTest do
     assert [_, {:gate, :effect, {:drive, twist, [:dry_run, :dead_man]}, 0}] = entries
     assert twist == Twist.zero()
 
-    controller = Controller.new(profile: Profile.magellan(), start: Pose.new(0, 0))
-
-    for {looks, count} <- [{true, 1}, {false, 0}] do
-      {entries, _, _} = recorded(:executive, {controller, %{looks: looks}}, [{:look, 0.3}])
+    for {ptz, count} <- [{{Some.Head, []}, 1}, {nil, 0}] do
+      look = {:cast, {:obey, {:look, 0.3}}}
+      {entries, _, _} = recorded(:executive, begun(Executive, ptz: ptz), [look])
       assert Enum.count(entries, &match?({:executive, :effect, {:look, _}, _}, &1)) == count
     end
   end
 
   test "why: what was perceived, all wishes, and the mission's phase" do
     profile = Profile.magellan()
-    controller = Controller.new(profile: profile, start: Pose.new(1, 2))
     odometry = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
     percept = %Percept{robot: :mag1, at_ms: 0, profile: profile, odometry: odometry}
-    begin = {controller, %{looks: true}}
-    goal = {:goal, :go, {Move, linear: 0.2, turn: 0.0}}
+    begin = begun(Executive, start: Pose.new(1, 2))
+    goal = {:cast, {:obey, {:goal, :go, {Move, linear: 0.2, turn: 0.0}}}}
     {entries, _, _} = recorded(:executive, begin, [goal, {:tick, percept}])
 
     pilot = {Runner.new(:mag1), %{state: nil}}
@@ -184,7 +184,7 @@ defmodule Robot.ReplayTest do
   test "the walls that the sonars see go to the pilot once each time that they change, and are replayed" do
     profile = Profile.magellan()
     plan = Robot.Navigation.OccupancyGrid.new()
-    begin = {Controller.new(profile: profile, start: Pose.new(1, 2), plan: plan), %{looks: true}}
+    begin = begun(Executive, start: Pose.new(1, 2), plan: plan)
 
     # Along a wall at its left.
     ranges = %{5 => 1.2, 6 => 0.87, 7 => 0.8, 8 => 0.87, 9 => 1.2}
@@ -197,11 +197,17 @@ defmodule Robot.ReplayTest do
         {:tick, %{shared | odometry: odometry, sonar: sonar}}
       end
 
-    {entries, {controller, _facts}, _} = recorded(:executive, begin, ticks)
-    told = for {:executive, :effect, {:walls, _} = walls, _} <- entries, do: walls
+    {entries, %{controller: controller}, _} = recorded(:executive, begin, ticks)
+
+    told =
+      for {:executive, :effect, {:cast, :pilot, {:walls, _} = walls}, _} <- entries, do: walls
+
     assert length(told) in 2..7
     assert Enum.all?(told, &(byte_size(:erlang.term_to_binary(&1)) < 2_000))
-    assert for({_, _, {:tick, percept}, _} <- entries, percept.grid, do: percept) == []
+
+    assert for({_, _, {:cast, :pilot, {:tick, percept}}, _} <- entries, percept.grid, do: percept) ==
+             []
+
     assert {_, [], _} = replay([{:executive, :begin, begin, 0} | entries])
 
     pilot = {Runner.new(:mag1), %{state: nil}}

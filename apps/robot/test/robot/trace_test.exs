@@ -2,13 +2,11 @@ defmodule Robot.TraceTest do
   @moduledoc "What the processes do is what the functions say: recorded inputs, fed to both."
   use Robot.Case, async: false
   alias Hal.{Odometry, Pose}
-  alias Robot.Control.Controller
   alias Robot.Mission.Runner
   alias Robot.Trace
   @moduletag :realtime
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
-    profile = Hal.Profile.magellan()
     start = Pose.new(1, 2)
     roll = fn v -> {:goal, :roll, {Acts.Roll, twist: Twist.new(v, 0.1)}} end
 
@@ -47,12 +45,8 @@ defmodule Robot.TraceTest do
 
     entries = for {_order, entry} <- :ets.tab2list(table), do: entry
 
-    assert [{:gate, :begin, gate, _at_ms}] =
-             for({:gate, :begin, _, _} = entry <- entries, do: entry)
-
-    assert compare(entries, :gate, gate, &gate/3) > 20
-    controller = Controller.new(profile: profile, start: start)
-    assert compare(entries, :executive, controller, &executive/3) > 20
+    assert compare(entries, :gate, begun(entries, :gate), handle(Gate)) > 20
+    assert compare(entries, :executive, begun(entries, :executive), handle(Executive)) > 20
     assert compare(entries, :pilot, nil, &pilot/3) == 6
   end
 
@@ -77,26 +71,20 @@ defmodule Robot.TraceTest do
     length(effects)
   end
 
-  defp gate(input, at_ms, gate) do
-    {gate, effects} = Gate.handle(input, at_ms, gate, %{})
-    {Enum.filter(effects, &Trace.effect?/1), gate}
+  # Its wheels are armed, or an order would not be recorded.
+  defp handle(role) do
+    board = %{arming: {%{state: :armed, why: nil}, 0}}
+
+    fn input, at_ms, state ->
+      {state, effects} = role.handle(input, at_ms, state, board)
+      {Enum.filter(effects, &Trace.effect?/1), state}
+    end
   end
 
-  defp executive({:tick, percept}, _at_ms, before) do
-    {wish, outcome, controller} = Controller.tick(before, percept)
-    outcomes = for {tag, outcome} <- List.wrap(outcome), do: {:outcome, tag, outcome}
-    said = outcomes ++ Controller.report(before, controller)
-    {[{:wish, wish}] ++ looks(wish.look) ++ said, controller}
+  defp begun(entries, role) do
+    assert [state] = for({^role, :begin, state, _at_ms} <- entries, do: state)
+    state
   end
-
-  defp executive(:stand, _at_ms, controller), do: {[], Controller.stand(controller)}
-
-  defp executive(order, _at_ms, controller) do
-    {controller, pan} = Controller.obey(controller, order)
-    {looks(pan), controller}
-  end
-
-  defp looks(pan), do: for(pan <- List.wrap(pan), do: {:look, pan})
 
   defp pilot({:start, module, options}, _at_ms, nil),
     do: :trace1 |> Runner.new() |> Runner.start(module, options) |> told()

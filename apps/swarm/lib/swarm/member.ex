@@ -17,7 +17,7 @@ defmodule Swarm.Member do
   """
   alias Hal.{Pose, Profile, Twist}
   alias Robot.{Mission, Percept}
-  alias Robot.Control.Controller
+  alias Robot.Control.{Controller, Executive, Pilot}
   alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Gate
   alias Swarm.{EStop, Message}
@@ -37,7 +37,7 @@ defmodule Swarm.Member do
                         :square
                       ])
 
-  @enforce_keys [:id, :profile, :boot, :mission, :runner, :controller, :gate, :receiver]
+  @enforce_keys [:id, :profile, :boot, :mission, :runner, :executive, :gate, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
@@ -51,7 +51,7 @@ defmodule Swarm.Member do
           boot: non_neg_integer(),
           mission: {module(), keyword()},
           runner: Runner.t(),
-          controller: Controller.t(),
+          executive: Executive.t(),
           gate: Gate.t(),
           receiver: Receiver.t(),
           stop: EStop.State.t(),
@@ -83,15 +83,15 @@ defmodule Swarm.Member do
   def new(options) do
     options = Keyword.validate!(options, [:id, :profile, :start, :mission, boot: 1, plan: nil])
     {module, mission_options} = options[:mission]
-    controller = Controller.new(Keyword.take(options, [:profile, :start, :plan]))
-    runner = Runner.new(options[:id], Controller.walls(controller))
+
+    # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
+    given = Keyword.take(options, [:id, :profile, :start, :plan])
+    config = struct!(Robot.Config, given ++ [drive: {__MODULE__, []}, ptz: {__MODULE__, []}])
+    entries = %{arming: {%{state: :armed, why: nil}, 0}}
+    {gate, _started} = Gate.init(config, entries, 0)
+    {executive, _started} = Executive.init(config, entries, 0)
+    runner = Runner.new(options[:id], Controller.walls(executive.controller))
     {runner, []} = Runner.start(runner, module, mission_options)
-
-    # In lockstep nothing is a device: the trial carries out what it is told.
-    config =
-      struct!(Robot.Config, Keyword.take(options, [:id, :profile]) ++ [drive: {__MODULE__, []}])
-
-    {gate, _started} = Gate.init(config, %{}, 0)
 
     %__MODULE__{
       id: options[:id],
@@ -99,8 +99,9 @@ defmodule Swarm.Member do
       boot: options[:boot],
       mission: options[:mission],
       runner: runner,
-      controller: controller,
+      executive: executive,
       gate: gate,
+      entries: entries,
       receiver: Receiver.new(options[:id])
     }
   end
@@ -163,15 +164,9 @@ defmodule Swarm.Member do
   def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
-    {wish, outcome, controller} = Controller.tick(member.controller, percept(member, at_ms))
-    {member, []} = gate(member, {:cast, {:wish, wish.twist}}, at_ms)
-    runner = Runner.walls(member.runner, Controller.walls(controller))
-    member = %{member | controller: controller, runner: runner}
-    {member, done} = ended(member, outcome)
-    # The walls that the runner has just got are what {:walls, packed} tells a pilot.
-    {member, effects} = handle(member, {:tick, Controller.percept(controller)})
+    {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
     {member, beats} = beat(member, at_ms)
-    {member, look(wish.look) ++ done ++ effects ++ beats}
+    {member, effects ++ beats}
   end
 
   def step(member, {:reflex, at_ms}), do: gate(member, :tick, at_ms)
@@ -191,7 +186,8 @@ defmodule Swarm.Member do
   """
   @spec uncertainty(t()) :: float() | nil
   def uncertainty(member) do
-    with %Percept{uncertainty: %{radius: radius}} <- Controller.percept(member.controller),
+    with %Percept{uncertainty: %{radius: radius}} <-
+           Controller.percept(member.executive.controller),
          do: radius,
          else: (_no_pose -> nil)
   end
@@ -209,15 +205,16 @@ defmodule Swarm.Member do
 
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
-  def stands?(member), do: Runner.state(member.runner) == :idle or member.controller.tag == :stand
+  def stands?(member),
+    do: Runner.state(member.runner) == :idle or member.executive.controller.tag == :stand
 
   # Replaces the mission that runs, if any; the ways are those of `Swarm.Comms.CommandHandler`.
   defp begin(member, {module, options}, command) do
     {runner, begun} = Runner.start(member.runner, module, options)
-    controller = Controller.stand(member.controller)
-    {member, begun} = carry_out(begun, %{member | runner: runner, controller: controller})
+    {member, stood} = carry_out(Pilot.Effects.dropped(), %{member | runner: runner})
+    {member, begun} = carry_out(begun, member)
     {member, effects} = handle(member, {:command, command})
-    {member, begun ++ effects}
+    {member, stood ++ begun ++ effects}
   end
 
   defp heard(member, {:message, message}, _at_ms), do: handle(member, {:message, message})
@@ -226,18 +223,40 @@ defmodule Swarm.Member do
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
     do: latch(member, EStop.State.hear(member.stop, beat.estop), at_ms)
 
-  # What the gate tells others is not of interest here.
   defp gate(member, input, at_ms) do
     {gate, effects} = Gate.handle(input, at_ms, member.gate, member.entries)
-
-    Enum.reduce(effects, {%{member | gate: gate}, []}, fn
-      {:drive, twist, limits}, {member, out} ->
-        {put(member, :driving, %{twist: twist, limits: limits}, at_ms), out ++ [{:drive, twist}]}
-
-      _inside, done ->
-        done
-    end)
+    carry(effects, %{member | gate: gate}, at_ms)
   end
+
+  defp executive(member, input, at_ms) do
+    {executive, effects} = Executive.handle(input, at_ms, member.executive, member.entries)
+    carry(effects, %{member | executive: executive}, at_ms)
+  end
+
+  # Carries out the effects of a role (`Robot.Role`): those that others notice are left.
+  defp carry(effects, member, at_ms) do
+    {out, member} = Enum.flat_map_reduce(effects, member, &carry_one(&1, &2, at_ms))
+    {member, out}
+  end
+
+  defp carry_one({:drive, twist, limits}, member, at_ms),
+    do: {[{:drive, twist}], put(member, :driving, %{twist: twist, limits: limits}, at_ms)}
+
+  defp carry_one({:look, pan}, member, _at_ms), do: {[{:look, pan, 0.0}], member}
+
+  defp carry_one({:cast, :gate, message}, member, at_ms),
+    do: back(gate(member, {:cast, message}, at_ms))
+
+  # As a pilot, which unpacks them.
+  defp carry_one({:cast, :pilot, {:walls, _packed}}, member, _at_ms) do
+    walls = Controller.walls(member.executive.controller)
+    {[], %{member | runner: Runner.walls(member.runner, walls)}}
+  end
+
+  defp carry_one({:cast, :pilot, event}, member, _at_ms), do: back(handle(member, event))
+  defp carry_one(_inside, member, _at_ms), do: {[], member}
+
+  defp back({member, effects}), do: {effects, member}
 
   defp put(member, key, value, at_ms),
     do: %{member | entries: Map.put(member.entries, key, {value, at_ms})}
@@ -278,15 +297,8 @@ defmodule Swarm.Member do
   defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
 
   defp halt(member, at_ms) do
-    controller = Controller.stand(member.controller)
-    member = %{member | controller: controller, runner: Runner.halt(member.runner)}
-    gate(member, {:cast, {:forget, nil}}, at_ms)
+    executive(%{member | runner: Runner.halt(member.runner)}, {:cast, {:stand, nil}}, at_ms)
   end
-
-  # The outcome first, so that the mission knows the result of its goal when it sees the next
-  # percept.
-  defp ended(member, nil), do: {member, []}
-  defp ended(member, {tag, result}), do: handle(member, {:outcome, tag, result})
 
   defp handle(member, event) do
     {runner, effects} = Runner.handle(member.runner, event)
@@ -300,19 +312,14 @@ defmodule Swarm.Member do
     {member, out}
   end
 
-  defp act({:obey, order}, member) do
-    {controller, pan} = Controller.obey(member.controller, order)
-    {look(pan), %{member | controller: controller}}
-  end
+  defp act({:obey, order}, member), do: back(executive(member, {:cast, {:obey, order}}, 0))
 
   defp act({:send, to, body}, member), do: {[{:send, to, Message.of(member.id, body)}], member}
   defp act({:stage, _name, _facts} = stage, member), do: {[stage], member}
 
-  defp look(pan), do: for(pan <- List.wrap(pan), do: {:look, pan, 0.0})
-
   defp beat(member, at_ms) do
     with true <- Heartbeat.due?(member.beat_ms, at_ms),
-         %Percept{pose: %Pose{}} = percept <- Controller.percept(member.controller) do
+         %Percept{pose: %Pose{}} = percept <- Controller.percept(member.executive.controller) do
       heard = Peers.heard(member.receiver.peers, at_ms)
       sender = {member.boot, member.sequence + 1}
 

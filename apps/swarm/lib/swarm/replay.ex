@@ -70,8 +70,8 @@ defmodule Swarm.Replay do
       end)
 
     %{
-      percept: Controller.percept(member.controller),
-      wishes: Controller.wishes(before.controller, percept),
+      percept: Controller.percept(member.executive.controller),
+      wishes: Controller.wishes(before.executive.controller, percept),
       driving: with({driving, _at_ms} <- member.entries[:driving], do: driving),
       stopped?: member.stop.held != [],
       before: Runner.explain(before.runner),

@@ -169,7 +169,7 @@ defmodule Bench.Mesh.Convoy do
 
   @doc false
   @spec trace(:counters.counters_ref(), pos_integer(), Robot.Trace.entry()) :: :ok
-  def trace(counters, index, {:executive, :effect, {:tick, _percept}, _at_ms}),
+  def trace(counters, index, {:executive, :effect, {:cast, :pilot, {:tick, _percept}}, _at_ms}),
     do: :counters.add(counters, index, 1)
 
   def trace(_counters, _index, _entry), do: :ok

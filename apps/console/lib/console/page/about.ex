@@ -48,7 +48,7 @@ defmodule Console.Page.About do
 
   @doc "The same of a robot in lockstep, by what it perceived last; it has no devices and no camera pictures to look at."
   @spec of_member(Member.t()) :: t() | nil
-  def of_member(%Member{controller: controller} = member) do
+  def of_member(%Member{executive: %{controller: controller}} = member) do
     with %Percept{} = percept <- Controller.percept(controller) do
       weights = Controller.weights(controller)
 

@@ -12,9 +12,9 @@ defmodule Robot.Control.Crash do
   @theirs [:kernel, :stdlib, :elixir, :erts, :compiler]
 
   @doc "Calls a function of the mission (`:pilot`) or of a behaviour (`:executive`); if it fails, tells so, and fails as it did."
-  @spec told(Robot.Config.t(), Board.t(), :pilot | :executive, (... -> result)) :: result
+  @spec told(Robot.Config.t(), Board.t(), role :: atom(), (... -> result)) :: result
         when result: term()
-  def told(config, board, part, function) do
+  def told(config, board, part, function) when part in [:pilot, :executive] do
     function.()
   catch
     kind, reason ->
@@ -26,8 +26,11 @@ defmodule Robot.Control.Crash do
       :erlang.raise(kind, reason, __STACKTRACE__)
   end
 
-  @doc "Another mission or goal begins."
-  @spec over(Board.t(), :pilot | :executive) :: :ok
+  # Of a role that runs no code of others.
+  def told(_config, _board, _role, function), do: function.()
+
+  @doc "Another mission begins."
+  @spec over(Board.t(), :pilot) :: :ok
   def over(board, part), do: Board.delete(board, part, {:crashed, part})
 
   @doc """

@@ -1,8 +1,9 @@
 defmodule Robot.Control.Executive do
   @moduledoc """
   Takes a percept from the board ten times a second, runs a tick of `Robot.Control.Controller`, and sends its wish to
-  the gate and the percept to the pilot. It only casts to other parts of the robot, so none of them can block it; what
-  takes long, such as vision, is a process of its own that writes to the board.
+  the gate and the percept to the pilot: each percept as `{:tick, percept}`, the walls that it knows when they change, as
+  `{:walls, packed}`, and each outcome of a goal, as `{:outcome, tag, integer}`. What takes long, such as vision, is a
+  process of its own that writes to the board.
 
   A behaviour that hangs blocks the executive. `Robot.Safety.LivenessMonitor` detects that and
   kills it.
@@ -13,28 +14,36 @@ defmodule Robot.Control.Executive do
 
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
-  """
-  use Hal.HardenedServer
-  alias Hal.{Device, Event, HardenedServer, Odometry, Ticker}
-  alias Robot.{Board, Departure, Mission, Names, Percept}
-  alias Robot.Control.{Controller, Crash, Inbox}
-  alias Robot.Trace
-  alias Robot.Safety.{DryRun, Gate, Readiness}
 
-  @period_ms 100
-  @slow_us 50_000
+  A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
+  """
+  @behaviour Robot.Role
+  alias Hal.{HardenedServer, Odometry}
+  alias Robot.{Board, Departure, Mission, Names, Percept}
+  alias Robot.Control.{Controller, Inbox}
+  alias Robot.Safety.{DryRun, Readiness}
+
   @call_ms 400
 
-  @doc """
-  Starts the executive of a robot. It passes each percept, as `{:tick, percept}`, the walls that it knows when they
-  change, as `{:walls, packed}`, and each outcome of a goal, as `{:outcome, tag, integer}`, to the sink:
-  `apply(m, f, a ++ [event])`.
+  @enforce_keys [:robot, :profile, :dry_run, :head?, :notes?, :controller, :departure]
+  defstruct @enforce_keys ++ [told: nil, held?: false, tick: 0]
+
+  @typedoc """
+  `head?` says whether there is a head to turn, `notes?` whether a file notes that the robot has left its start pose;
+  `departure` is what is noted of that, `told` the last line of a dry run.
   """
-  @spec start_link({Robot.Config.t(), sink :: Robot.Config.call()}) :: GenServer.on_start()
-  def start_link({%Robot.Config{} = config, {_m, _f, _a} = sink}) do
-    name = Names.via(config.id, :executive)
-    HardenedServer.start_link(__MODULE__, {config, sink}, name: name)
-  end
+  @type t :: %__MODULE__{
+          robot: atom(),
+          profile: Hal.Profile.t(),
+          dry_run: boolean(),
+          head?: boolean(),
+          notes?: boolean(),
+          controller: Controller.t(),
+          departure: {:was | :near, Departure.frame() | nil} | :noted,
+          told: String.t() | nil,
+          held?: boolean(),
+          tick: non_neg_integer()
+        }
 
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
@@ -91,21 +100,26 @@ defmodule Robot.Control.Executive do
 
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
-  @impl GenServer
-  def init({%Robot.Config{id: id} = config, sink}) do
-    Gate.forget(id)
-    board = Board.find!(id)
-    at_ms = Robot.Config.now(config)
-    doing = %{by: :idle, weights: [], way: [], limits: [], outcome: nil, fault: nil, tick: 0}
-    Board.put(board, :executive, :doing, doing, at_ms)
-    Board.put(board, :executive, :goal, nil, at_ms)
-    Event.execute([:robot, :executive, :start], %{at_ms: at_ms}, %{robot: id})
-    departed = Board.departed(board)
+  @impl Robot.Role
+  def name, do: :executive
 
-    s = %{
-      config: config,
-      board: board,
-      sink: sink,
+  @impl Robot.Role
+  def period_ms, do: 100
+
+  @impl Robot.Role
+  def priority, do: :normal
+
+  @impl Robot.Role
+  def init(%Robot.Config{} = config, board, _at_ms) do
+    departed = Board.departed(board)
+    doing = %{by: :idle, weights: [], way: [], limits: [], outcome: nil, fault: nil, tick: 0}
+
+    state = %__MODULE__{
+      robot: config.id,
+      profile: config.profile,
+      dry_run: config.dry_run,
+      head?: config.ptz != nil,
+      notes?: config.departure_file != nil,
       controller:
         Controller.new(
           profile: config.profile,
@@ -113,120 +127,92 @@ defmodule Robot.Control.Executive do
           departed: departed,
           plan: config.plan
         ),
-      departure: if(departed, do: {:was, departed}, else: {:near, nil}),
-      told: nil,
-      held?: false,
-      tick: 0,
-      ticker: Robot.Config.ticker(config, :tick, @period_ms)
+      departure: if(departed, do: {:was, departed}, else: {:near, nil})
     }
 
-    Trace.begin(config, :executive, state(s), at_ms)
-    {:ok, s}
+    {state,
+     [{:cast, :gate, {:forget, nil}}, {:put, :doing, doing}, {:put, :goal, nil}] ++
+       [{:event, [:robot, :executive, :start], %{}}]}
   end
 
-  @impl GenServer
-  def handle_call({:goal, _tag, _goal} = order, _from, s) do
+  @doc "The percept of a tick, before the pose is estimated: what a recording holds of the board."
+  @impl Robot.Role
+  def perceive(at_ms, s, board), do: {:tick, Percept.Snapshot.take(board, s.profile, at_ms)}
+
+  @impl Robot.Role
+  def handle({:tick, %Percept{} = raw}, _at_ms, s, _board), do: tick(s, raw)
+
+  def handle({:ask, from, {:goal, _tag, _goal} = order}, _at_ms, s, board) do
     cond do
-      not Inbox.order?(order) -> HardenedServer.drop(s)
-      refusal = refusal(order, s) -> {:reply, refusal, s}
-      true -> {:reply, :ok, obeyed(s, order)}
+      not Inbox.order?(order) -> :unknown
+      refusal = refusal(order, s, board) -> {s, [{:answer, from, refusal}]}
+      true -> answered(obeyed(s, order), from)
     end
   end
 
-  @impl GenServer
-  def handle_cast({:confirm, _then}, %{held?: true} = s), do: {:noreply, s}
-
-  def handle_cast({:obey, order}, s) do
+  def handle({:cast, {:obey, order}}, _at_ms, s, board) do
     cond do
-      not Inbox.order?(order) -> HardenedServer.drop(s)
-      refusal(order, s) -> {:noreply, s}
-      true -> {:noreply, obeyed(s, order)}
+      not Inbox.order?(order) -> :unknown
+      refusal(order, s, board) -> {s, []}
+      true -> obeyed(s, order)
     end
   end
 
-  def handle_cast({:confirm, {m, f, a} = then}, s) do
-    if HardenedServer.callable?(then) do
-      apply(m, f, a)
-      {:noreply, s}
-    else
-      HardenedServer.drop(s)
+  def handle({:cast, {:confirm, then}}, _at_ms, s, _board) do
+    cond do
+      s.held? -> {s, []}
+      HardenedServer.callable?(then) -> {s, [{:apply, then}]}
+      true -> :unknown
     end
   end
 
-  def handle_cast(:hold, s), do: {:noreply, hold_on(s)}
-  def handle_cast(:disarmed, %{config: %{dry_run: true}} = s), do: {:noreply, s}
+  def handle({:cast, :hold}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
+  def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
   # The pilot, which is told too, ends the mission; one that hangs may still set a goal meanwhile.
-  def handle_cast(:disarmed, s), do: {:noreply, hold_on(s)}
+  def handle({:cast, :disarmed}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
 
-  def handle_cast({:stand, then}, s) do
-    if HardenedServer.then?(then),
-      do: {:noreply, %{drop(s, then) | held?: false}},
-      else: HardenedServer.drop(s)
+  def handle({:cast, {:stand, then}}, _at_ms, s, _board) do
+    if HardenedServer.then?(then), do: drop(%{s | held?: false}, then), else: :unknown
   end
 
-  defp hold_on(s), do: %{drop(s, nil) | held?: true}
+  def handle(_unknown, _at_ms, _s, _board), do: :unknown
 
-  defp refusal({:goal, _tag, {_module, _options}}, %{held?: true}),
+  defp answered({s, effects}, from), do: {s, effects ++ [{:answer, from, :ok}]}
+
+  defp refusal({:goal, _tag, {_module, _options}}, %{held?: true}, _board),
     do: {:error, "its mission is being ended"}
 
-  defp refusal({:goal, _tag, {_module, _options}}, s) do
-    with :ok <- Readiness.armed(s.config, s.board), do: nil
+  defp refusal({:goal, _tag, {_module, _options}}, s, board) do
+    with :ok <- Readiness.armed(s, board), do: nil
   end
 
-  defp refusal(_order, _s), do: nil
+  defp refusal(_order, _s, _board), do: nil
 
   defp obeyed(s, order) do
-    at_ms = Robot.Config.now(s.config)
-    Trace.input(s.config, :executive, order, at_ms)
     {controller, pan} = Controller.obey(s.controller, order)
-    s |> pursue(controller) |> look(pan, at_ms)
+    {s, pursued} = pursue(s, controller)
+    {s, looks} = look(s, pan)
+    {s, pursued ++ looks}
   end
-
-  @impl GenServer
-  def handle_info(:tick, s) do
-    begun = System.monotonic_time(:microsecond)
-    s = Crash.told(s.config, s.board, :executive, fn -> tick(s, Robot.Config.now(s.config)) end)
-    took = System.monotonic_time(:microsecond) - begun
-
-    if took > @slow_us do
-      measured = %{at_ms: Robot.Config.now(s.config), duration_ms: div(took, 1_000)}
-      Event.execute([:robot, :executive, :slow], measured, %{robot: s.config.id})
-    end
-
-    {:noreply, schedule(s)}
-  end
-
-  defp state(%{config: config} = s),
-    do: {s.controller, %{looks: config.ptz != nil and not config.dry_run}}
 
   defp drop(s, then) do
-    Trace.input(s.config, :executive, :stand, Robot.Config.now(s.config))
-    Gate.forget(s.config.id, then)
-    pursue(s, Controller.stand(s.controller))
+    {s, pursued} = pursue(s, Controller.stand(s.controller))
+    {s, [{:cast, :gate, {:forget, then}} | pursued]}
   end
 
   # The goal is on the board before its first tick, so that a hang in that tick can be attributed.
   defp pursue(%{controller: %{module: module}} = s, %{module: module} = controller),
-    do: %{s | controller: controller}
+    do: {%{s | controller: controller}, []}
 
   defp pursue(s, controller) do
-    if controller.module, do: Crash.over(s.board, :executive)
-    Board.put(s.board, :executive, :goal, controller.module, Robot.Config.now(s.config))
-    %{s | controller: controller}
+    over = if controller.module, do: [{:delete, {:crashed, :executive}}], else: []
+    {%{s | controller: controller}, over ++ [{:put, :goal, controller.module}]}
   end
 
-  defp tick(%{config: config, board: board} = s, at_ms) do
-    raw = Percept.Snapshot.take(board, config.profile, at_ms)
-    Trace.checkpoint(config, :executive, fn -> state(s) end, at_ms)
-    Trace.input(config, :executive, {:tick, raw}, at_ms)
+  defp tick(s, raw) do
     {wish, outcome, controller} = Controller.tick(s.controller, raw)
     percept = Controller.percept(controller)
-
-    Gate.wish(config.id, wish.twist)
-    Trace.effect(config, :executive, {:wish, wish}, at_ms)
-    s = look(s, wish.look, at_ms)
-
-    fault = fault(s, Controller.fault(controller), at_ms)
+    fault = Controller.fault(controller)
 
     doing = %{
       by: wish.by,
@@ -238,75 +224,58 @@ defmodule Robot.Control.Executive do
       tick: s.tick + 1
     }
 
-    Board.put(board, :executive, :doing, doing, at_ms)
-    if percept.pose, do: place(board, percept, at_ms)
-
     # The outcome comes first, so that the mission knows it when it handles the percept.
-    with {tag, outcome} <- outcome, do: tell(s, {:outcome, tag, outcome}, at_ms)
-    for event <- Controller.report(s.controller, controller), do: tell(s, event, at_ms)
-    s = depart(s, percept.odometry)
-    %{s | controller: controller, tick: doing.tick}
+    ended = with {tag, outcome} <- outcome, do: {:outcome, tag, outcome}
+    told = List.wrap(ended) ++ Controller.report(s.controller, controller)
+
+    faults =
+      if fault == Controller.fault(s.controller),
+        do: [],
+        else: [{:event, [:robot, :fault], %{line: fault}}]
+
+    {s, looks} = look(s, wish.look)
+    {s, left} = depart(s, percept.odometry)
+
+    {%{s | controller: controller, tick: doing.tick},
+     [{:cast, :gate, {:wish, wish.twist}}] ++
+       looks ++
+       faults ++
+       [{:put, :doing, doing}] ++
+       place(percept) ++ for(event <- told, do: {:cast, :pilot, event}) ++ left}
   end
 
   # By the first reading of the odometry the localiser knows whether the start pose is its zero.
-  defp depart(s, nil), do: s
-  defp depart(%{config: %{departure_file: nil}} = s, _odometry), do: s
-  defp depart(%{departure: :noted} = s, _odometry), do: s
+  defp depart(s, nil), do: {s, []}
+  defp depart(%{notes?: false} = s, _odometry), do: {s, []}
+  defp depart(%{departure: :noted} = s, _odometry), do: {s, []}
 
   defp depart(%{departure: {:was, noted}} = s, %Odometry{frame: frame}) do
-    if not Departure.start?(noted, frame) do
-      measured = %{at_ms: Robot.Config.now(s.config)}
-      Event.execute([:robot, :executive, :away], measured, %{robot: s.config.id})
-    end
+    away =
+      if Departure.start?(noted, frame),
+        do: [],
+        else: [{:event, [:robot, :executive, :away], %{}}]
 
-    %{s | departure: :noted}
+    {%{s | departure: :noted}, away}
   end
 
   # After a counter jump the place is unknown, so the frame of the last reading near zero is noted.
   defp depart(%{departure: {:near, frame}} = s, %Odometry{pose: pose} = odometry) do
-    if Departure.left?(pose) do
-      Board.depart(s.board, frame || Departure.frame(nil))
-      %{s | departure: :noted}
-    else
-      %{s | departure: {:near, Departure.frame(odometry.frame)}}
-    end
+    if Departure.left?(pose),
+      do: {%{s | departure: :noted}, [{:depart, frame || Departure.frame(nil)}]},
+      else: {%{s | departure: {:near, Departure.frame(odometry.frame)}}, []}
   end
 
-  defp place(board, %{pose: pose, uncertainty: uncertainty}, at_ms) do
-    Board.put(board, :executive, :pose, pose, at_ms)
-    Board.put(board, :executive, :uncertainty, uncertainty, at_ms)
+  defp place(%{pose: nil}), do: []
+
+  defp place(%{pose: pose, uncertainty: uncertainty}),
+    do: [{:put, :pose, pose}, {:put, :uncertainty, uncertainty}]
+
+  defp look(s, pan) when pan == nil or not s.head?, do: {s, []}
+
+  defp look(%{dry_run: true} = s, pan) do
+    {effects, told} = DryRun.tell(s.robot, {:look, pan}, s.told)
+    {%{s | told: told}, effects}
   end
 
-  # Reports a fault when it changes.
-  defp fault(s, line, at_ms) do
-    if line != Controller.fault(s.controller),
-      do: Event.execute([:robot, :fault], %{at_ms: at_ms}, %{robot: s.config.id, line: line})
-
-    line
-  end
-
-  defp look(%{config: %{ptz: ptz}} = s, pan, _at_ms) when pan == nil or ptz == nil, do: s
-
-  defp look(%{config: %{dry_run: true}} = s, pan, at_ms),
-    do: told(s, DryRun.tell(s.config.id, {:look, pan}, s.told), at_ms)
-
-  defp look(%{config: config} = s, pan, at_ms) do
-    Device.look(Names.via(config.id, :ptz), pan * 1.0, 0.0)
-    Trace.effect(config, :executive, {:look, pan}, at_ms)
-    s
-  end
-
-  defp told(s, {effects, line}, at_ms) do
-    for {:event, name, about} <- effects,
-        do: Event.execute(name, %{at_ms: at_ms}, Map.put(about, :robot, s.config.id))
-
-    %{s | told: line}
-  end
-
-  defp tell(%{sink: {m, f, a}} = s, event, at_ms) do
-    apply(m, f, a ++ [event])
-    Trace.effect(s.config, :executive, event, at_ms)
-  end
-
-  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
+  defp look(s, pan), do: {s, [{:look, pan}]}
 end

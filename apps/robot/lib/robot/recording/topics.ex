@@ -103,7 +103,13 @@ defmodule Robot.Recording.Topics do
         do: {{id, :boxes}, ns, Drawing.boxes(unix_ns(at_ms, offset_ms), picture)}
   end
 
-  defp said(robot, id, {:executive, :effect, {:tick, %Percept{} = percept}}, at_ms, ns) do
+  defp said(
+         robot,
+         id,
+         {:executive, :effect, {:cast, :pilot, {:tick, %Percept{} = percept}}},
+         at_ms,
+         ns
+       ) do
     {robot, state} = state(robot, id, percept, at_ms, ns)
     {robot, blobs} = blobs(robot, id, percept.detections, at_ms)
     {robot, place} = place(robot, id, percept.pose, at_ms, ns)

@@ -3,7 +3,7 @@ defmodule Robot.Replay.Moment do
   Describes what a replayed robot did last, and from what: kept during a replay, for people who ask why
   (`mix replay --why`). Pure.
   """
-  alias Robot.Control.Controller
+  alias Robot.Control.{Controller, Executive}
   alias Robot.Mission.Runner
 
   defstruct at_ms: nil, tick: nil, driving: nil, mission: nil, stopped?: false, effects: []
@@ -32,7 +32,7 @@ defmodule Robot.Replay.Moment do
         moment,
         :executive,
         {:input, {:tick, raw}, at_ms},
-        %{state: {controller, _}},
+        %{state: %Executive{controller: controller}},
         _after_it
       ),
       do: %{moment | at_ms: at_ms, tick: {controller, raw}, effects: []}

@@ -3,20 +3,19 @@ defmodule Robot.Replay.Roles do
   # Describes what the processes of a robot do on an input (`Robot.Trace`), as functions of their
   # state: the same pure functions that they call, and the order in which they carry out the effects.
   # Pure if the mission is.
-  alias Robot.Control.Controller
+  alias Robot.Control.Executive
   alias Robot.Mission.Runner
   alias Robot.Navigation.Grid
   alias Robot.Safety.Gate
   alias Robot.Trace
-  import Robot.Mission, only: [is_order: 1]
 
   @typedoc "The state of a role, and what it needs to know besides (`Robot.Trace`)."
-  @type t :: Gate.t() | {struct(), map()}
+  @type t :: Gate.t() | Executive.t() | {struct(), map()}
   @type result :: {t(), effects :: [term()]}
 
   @states [
     gate: Gate,
-    executive: {Controller, :looks},
+    executive: Executive,
     pilot: {Runner, :state}
   ]
 
@@ -58,38 +57,21 @@ defmodule Robot.Replay.Roles do
 
   def begin(:pilot, {%Runner{}, %{state: _state}} = state), do: {state, []}
   def begin(:gate, %Gate{} = state), do: {state, []}
-  def begin(:executive, {%Controller{}, %{looks: _}} = state), do: {state, []}
+  def begin(:executive, %Executive{} = state), do: {state, []}
 
   @doc "What a role does on an input at this time of the robot's clock."
   @spec input(atom(), t(), term(), at_ms :: integer()) :: result()
-  def input(:gate, gate, input, at_ms) do
-    {gate, effects} = Gate.handle(input, at_ms, gate, %{})
-    {gate, Enum.filter(effects, &Trace.effect?/1)}
-  end
-
-  def input(:executive, {controller, facts}, what, _at_ms) do
-    {controller, effects} = executive(what, controller, facts)
-    {{controller, facts}, effects}
-  end
-
+  def input(:gate, state, input, at_ms), do: handled(Gate, state, input, at_ms)
+  def input(:executive, state, input, at_ms), do: handled(Executive, state, input, at_ms)
   def input(:pilot, {runner, facts}, what, _at_ms), do: pilot(what, runner, facts)
 
-  defp executive({:tick, percept}, before, facts) do
-    {wish, outcome, controller} = Controller.tick(before, percept)
-    ended = with {tag, outcome} <- outcome, do: {:outcome, tag, outcome}
-    told = List.wrap(ended) ++ Controller.report(before, controller)
-    {controller, [{:wish, wish} | look(wish.look, facts)] ++ told}
+  # Of orders only those are recorded that the board did not refuse: here its wheels are armed.
+  @board %{arming: {%{state: :armed, why: nil}, 0}}
+
+  defp handled(role, state, input, at_ms) do
+    {state, effects} = role.handle(input, at_ms, state, @board)
+    {state, Enum.filter(effects, &Trace.effect?/1)}
   end
-
-  defp executive(:stand, controller, _facts), do: {Controller.stand(controller), []}
-
-  defp executive(order, controller, facts) when is_order(order) do
-    {controller, pan} = Controller.obey(controller, order)
-    {controller, look(pan, facts)}
-  end
-
-  defp look(nil, _facts), do: []
-  defp look(pan, facts), do: if(facts.looks, do: [{:look, pan}], else: [])
 
   defp pilot({:start, module, options}, runner, facts),
     do: runner |> Runner.start(module, options) |> follow(facts)

@@ -96,6 +96,9 @@ defmodule Robot.Safety.Gate do
   def period_ms, do: 50
 
   @impl Robot.Role
+  def priority, do: :high
+
+  @impl Robot.Role
   def init(%Robot.Config{} = config, board, _at_ms) do
     latched? = Board.latched?(board)
     if config.dry_run, do: DryRun.attach()

@@ -34,9 +34,10 @@ defmodule Robot.Safety.Readiness do
   The same of the wheels alone: a drive that is armed and has gone offline because it does not obey
   is told again and again, until it does.
   """
-  @spec armed(Robot.Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
-  def armed(%Robot.Config{dry_run: true}, _board), do: :ok
-  def armed(%Robot.Config{}, board), do: judge(entry(board, :arming), nil)
+  @spec armed(%{:dry_run => boolean(), optional(atom()) => term()}, Board.t() | Board.entries()) ::
+          :ok | {:error, line :: String.t()}
+  def armed(%{dry_run: true}, _board), do: :ok
+  def armed(%{dry_run: false}, board), do: judge(entry(board, :arming), nil)
 
   @doc """
   `:ok`, or the reason as a line that does not name the robot. If the reason why the drive is
@@ -107,7 +108,7 @@ defmodule Robot.Safety.Readiness do
   defp brief(reason), do: inspect(reason, limit: 5, printable_limit: 40)
 
   defp entry(board, key) do
-    case Board.fetch(board, key, :infinity) do
+    case Board.fetch(board, key, :infinity, 0) do
       {:ok, value, _at_ms} -> value
       :error -> nil
     end

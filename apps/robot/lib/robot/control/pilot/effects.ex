@@ -38,9 +38,11 @@ defmodule Robot.Control.Pilot.Effects do
   @doc "Makes the executive drop the orders of a mission that has ended."
   @spec drop_orders(Robot.Config.t()) :: :ok
   def drop_orders(%Robot.Config{id: id}) do
-    for order <- [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}],
-        do: Executive.obey(id, order)
-
+    for order <- dropped(), do: Executive.obey(id, order)
     :ok
   end
+
+  @doc "The orders that do it."
+  @spec dropped() :: [Robot.Mission.order()]
+  def dropped, do: [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}]
 end
