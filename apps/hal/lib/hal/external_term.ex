@@ -45,6 +45,15 @@ defmodule Hal.ExternalTerm do
     ArgumentError -> :error
   end
 
+  @doc "Whether `decode/2` would decode bytes, if all atoms in them exist here. Makes nothing of them."
+  @spec bounded?(binary(), most :: pos_integer()) :: boolean()
+  def bounded?(bytes, most) do
+    case unpacked(bytes, most) do
+      {:ok, plain} -> within?(plain, most)
+      :error -> false
+    end
+  end
+
   @doc "Whether a term, written without compression, is one that `decode/2` takes."
   @spec decodable?(term(), most :: pos_integer()) :: boolean()
   def decodable?(term, most) do

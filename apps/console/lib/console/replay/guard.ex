@@ -4,7 +4,7 @@ defmodule Console.Replay.Guard do
   # anybody's: what it holds has the right form and checksums, and yet may be what no robot of ours has been told, on which
   # a replay fails, or does not end.
 
-  # Bytes of the process's heap; a replay of a hundred robots has some 0.5 GB.
+  # Of the process's heap.
   @most_bytes 2_000_000_000
   # From one tick or entry to the next, in reductions: some seconds of a processor, however busy the machine is. A tick of a
   # hundred robots takes 6 million.
@@ -15,13 +15,13 @@ defmodule Console.Replay.Guard do
   What the function returns. What it fails with is an error of one line that names the file; a lost output, and the exit
   of a command, pass, and so does `Mcap.DamagedError`.
   """
-  @spec run(Path.t(), (... -> result), keyword()) :: result | {:error, line :: String.t()}
+  @spec run(Path.t(), (... -> result)) :: result | {:error, line :: String.t()}
         when result: term()
-  def run(path, read, limits \\ []) do
+  def run(path, read) do
     passed = :atomics.new(1, [])
 
     heap = %{
-      size: div(limits[:bytes] || @most_bytes, :erlang.system_info(:wordsize)),
+      size: div(@most_bytes, :erlang.system_info(:wordsize)),
       kill: true,
       error_logger: false
     }
@@ -40,7 +40,6 @@ defmodule Console.Replay.Guard do
       pid: pid,
       monitor: monitor,
       passed: passed,
-      most: limits[:work] || @most_work,
       seen: {0, 0}
     })
   end
@@ -72,7 +71,7 @@ defmodule Console.Replay.Guard do
   # The work on a tick counts from the first look that finds it begun.
   defp look(%{pid: pid, seen: {tick, from}} = guard) do
     case {:atomics.get(guard.passed, 1), Process.info(pid, :reductions)} do
-      {^tick, {:reductions, work}} when work - from > guard.most ->
+      {^tick, {:reductions, work}} when work - from > @most_work ->
         Process.demonitor(guard.monitor, [:flush])
         Process.exit(pid, :kill)
         told(guard.path, "takes too long")
