@@ -22,8 +22,8 @@ defmodule Hal.ExternalTerm do
 
   @doc """
   The term, if neither its bytes, unpacked, nor its memory are more than `most` bytes. Creates no atoms, and
-  takes data only: of functions those with a name that exist here, no processes, references or ports; numbers of up to #{@most_digits} bytes;
-  #{@most_depth} levels.
+  takes data only: of functions those with a name that exist here, no processes, references or ports; numbers of up
+  to #{@most_digits} bytes; #{@most_depth} levels.
 
       iex> Hal.ExternalTerm.decode(:erlang.term_to_binary({:ok, [1, 2.5]}), 100)
       {:ok, {:ok, [1, 2.5]}}

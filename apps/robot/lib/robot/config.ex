@@ -30,8 +30,8 @@ defmodule Robot.Config do
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
-    * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), with `:code` also by code that comes along;
-      default `false`
+    * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), with `:code` also by code that
+      comes along; default `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`

@@ -16,7 +16,8 @@ defmodule Sim.Fleet.Robot do
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
   kind of blobs, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
-  first), what of a mission may be replaced (`Robot.Config`), and the run's folder, which holds the serial lines of robots with real drivers.
+  first), what of a mission may be replaced (`Robot.Config`), and the run's folder, which holds the serial
+  lines of robots with real drivers.
   """
   @type common :: %{
           world: term(),

@@ -15,7 +15,7 @@ defmodule Swarm.Replacement.Entries do
   @typedoc "What was put in the place of the mission of the robot's config, if anything (`Robot.Board`)."
   @type noted :: %{mission: Job.mission() | nil, changing?: boolean(), says: String.t()} | nil
 
-  @doc "Whether the robot's config allows that its mission is replaced, and by code that comes along; the error is one line."
+  @doc "Whether the robot's config allows another mission, with `code?` one whose code comes along; the error is one line."
   @spec allowed(atom(), code? :: boolean()) :: :ok | {:error, line :: String.t()}
   def allowed(robot, code? \\ false) do
     case entry(robot, :release) do

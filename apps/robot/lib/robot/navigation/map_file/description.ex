@@ -2,7 +2,8 @@ defmodule Robot.Navigation.MapFile.Description do
   @moduledoc false
   # Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
   # (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
-  # corner of the picture lies, and how far it is turned round that, counterclockwise in radians), and optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
+  # corner of the picture lies, and how far it is turned round that, counterclockwise in radians), and
+  # optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
   # Read as data: no other YAML is understood, other keys are ignored. Pure.
   #
   # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not

@@ -1,6 +1,7 @@
 defmodule Robot.Navigation.MapFile.Turn do
   @moduledoc """
-  Turns the cells of a picture as the pose of its lower left corner says, counterclockwise, into rows of the map's frame. Pure.
+  Turns the cells of a picture as the pose of its lower left corner says, counterclockwise, into rows of the map's
+  frame. Pure.
   """
 
   # Where a cell is looked at, in parts of its width from its middle: close enough that no wall of one cell has a gap.
@@ -9,8 +10,8 @@ defmodule Robot.Navigation.MapFile.Turn do
   @straight 1.0e-5
 
   @doc """
-  Rows of cells `cell` metres wide, 1 is wall, from the lowest, whose lower left corner is at `{x, y}` and whose rows run in the
-  direction `turn` (radians): as rows along the axes of the map, with the place of their lower left corner. What
+  Rows of cells `cell` metres wide, 1 is wall, from the lowest, whose lower left corner is at `{x, y}` and whose rows
+  run in the direction `turn` (radians): as rows along the axes of the map, with the place of their lower left corner. What
   the turned picture does not cover is wall.
 
       iex> Robot.Navigation.MapFile.Turn.turn([<<0, 0, 1>>, <<0, 1, 1>>], 1.0, {5.0, 0.0, :math.pi() / 2})
