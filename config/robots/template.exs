@@ -97,8 +97,8 @@
   # With true nothing moves, and what would be done is printed. For the first run of a robot.
   # dry_run: false,
 
-  # With true its mission may be replaced while it is under way, also by code that its release does not have, by
-  # whoever has the fleet's secret (docs/missions.md). A restart returns to the release.
+  # With true its mission may be replaced while it is under way by whoever has the fleet's secret, with :code also by
+  # code that its release does not have (docs/missions.md). A restart returns to the release.
   # replace: false,
 
   # Here an e-stop outlives a restart of the machine; the folder must be there.

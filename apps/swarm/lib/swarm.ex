@@ -118,8 +118,9 @@ defmodule Swarm do
 
   With `:code`, the object code of the mission and of modules below its name goes along, at most 128 kB: of
   the files of this node's build, as they are now, or as it is given. A robot takes only what the fleet's key has signed
-  (`Swarm.Replacement.Order`), code only of missions (`Swarm.Replacement.Code`), and all that only if its file says
-  `replace: true`; simulated robots do. A restart of the robot returns to its release.
+  (`Swarm.Replacement.Order`), code only of missions (`Swarm.Replacement.Code`), and a mission only if its file says
+  `replace: true`, as simulated robots do, code only if it says `replace: :code`. A restart of the robot returns to its
+  release.
   """
   @spec replace(
           robot() | [robot()] | :all,

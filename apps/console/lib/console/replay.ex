@@ -5,7 +5,7 @@ defmodule Console.Replay do
   tick (`.Session`).
   """
   alias Console.Cli.{Format, Output}
-  alias Console.Replay.{Asked, Difference, Live, Moment, Options, Session}
+  alias Console.Replay.{Asked, Difference, Guard, Live, Moment, Options, Session}
   alias Console.Tables
   alias Sim.{Recording, Replay, Trial}
 
@@ -18,6 +18,12 @@ defmodule Console.Replay do
   """
   @spec run(Options.t()) :: 0 | 1 | 2
   def run(%Options{} = options) do
+    with {:error, line} <- Guard.run(options.file, fn -> read(options) end), do: refuse(line)
+  rescue
+    error in Mcap.DamagedError -> refuse(Exception.message(error))
+  end
+
+  defp read(options) do
     with :other <- Live.run(options),
          {:ok, file} <- Recording.File.open(options.file),
          :ok <- asked(options, file),
@@ -25,10 +31,8 @@ defmodule Console.Replay do
       status
     else
       {:live, status} -> status
-      {:error, line} -> refuse(line)
+      {:error, line} -> {:error, line}
     end
-  rescue
-    error in Mcap.DamagedError -> refuse(Exception.message(error))
   end
 
   defp asked(options, file) do
@@ -52,8 +56,7 @@ defmodule Console.Replay do
   defp against(one, options) do
     with {:ok, other} <- Recording.File.open(options.against) do
       if one.setup == other.setup do
-        {:ok,
-         told(Recording.Comparison.first(Recording.File.ticks(one), Recording.File.ticks(other)))}
+        {:ok, told(Recording.Comparison.first(ticks(one), ticks(other)))}
       else
         IO.puts("The two begin differently: #{Difference.setups(one.setup, other.setup)}")
         {:ok, 2}
@@ -100,7 +103,7 @@ defmodule Console.Replay do
 
       run =
         file
-        |> Recording.File.ticks()
+        |> ticks()
         |> Stream.take_while(fn {at_ms, _entries} -> at_ms <= until_ms end)
         |> Enum.reduce(run, &step/2)
 
@@ -110,6 +113,8 @@ defmodule Console.Replay do
       with :ok <- close(run.tables), do: {:ok, if(run.differences == [], do: 0, else: 2)}
     end
   end
+
+  defp ticks(file), do: Guard.watched(Recording.File.ticks(file))
 
   defp tables(%{csv: nil}), do: {:ok, nil}
   defp tables(%{csv: folder}), do: named(Tables.open(folder))

@@ -28,7 +28,8 @@ defmodule Robot.Config do
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
-    * `:replace` - whether its mission, and the code of it, may be replaced while it runs (`Swarm.replace/2`), default `false`
+    * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), with `:code` also by code that
+      comes along; default `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`
@@ -88,7 +89,7 @@ defmodule Robot.Config do
           plan: Robot.Navigation.Grid.t() | Robot.Navigation.OccupancyGrid.t() | nil,
           fence: Fence.t() | nil,
           dry_run: boolean(),
-          replace: boolean(),
+          replace: boolean() | :code,
           estop_file: Path.t() | nil,
           departure_file: Path.t() | nil,
           trace: call() | nil
@@ -156,7 +157,7 @@ defmodule Robot.Config do
       plan: [{:check, &plan?/1, "walls"}, default: nil],
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
-      replace: :boolean,
+      replace: {:one_of, [false, true, :code]},
       estop_file: [{:path, "the path of a file"}, default: nil],
       departure_file: [{:path, "the path of a file"}, default: nil],
       trace: [:mfa, default: nil]

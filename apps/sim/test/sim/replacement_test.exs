@@ -120,7 +120,12 @@ defmodule Sim.ReplacementTest do
       mission: {:patrol, period: 60}
     ]
 
+    # Off unless configured, of simulated robots, too.
     {:ok, fleet} = Fleet.start_link(options)
+    assert {:error, line} = order(fn -> Swarm.replace(:all, {:code, second}) end)
+    assert line =~ "it takes no code from others"
+    Fleet.stop(fleet)
+    {:ok, fleet} = Fleet.start_link([replace: :code] ++ options)
     eventually(&drive?/0)
 
     assert order(fn -> Swarm.replace(:all, {:code, second, speed: 0.2}) end) == :ok

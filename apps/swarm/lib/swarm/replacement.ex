@@ -6,13 +6,15 @@ defmodule Swarm.Replacement do
   | part | what it does |
   |---|---|
   | `Swarm.Replacement.Order` | the order as bytes, and its signature by the fleet's key |
-  | `Swarm.Replacement.Code` | which code may come, and how it is loaded and brought back |
+  | `Swarm.Replacement.Code`, `.ObjectCode` | which code may come, and how it is loaded and brought back |
+  | `Swarm.Replacement.Rehearsal` | a VM that loads it first |
   | `Swarm.Replacement.Job` | one replacement on one node, as a function |
   | `Swarm.Replacement.Admission`, `.Entries` | whether an order is carried out; what is read on the boards of robots, and noted there |
   | `Swarm.Replacement.Server` | the process of a node |
 
   The release stays as it is: nothing is written to a disk, and a robot that starts again has its own mission, and its own
-  code. On real robots it is off unless their file says `replace: true`.
+  code. On real robots it is off unless their file says `replace: true`, and code comes
+  only where it says `replace: :code`, on simulated robots, too.
   """
   alias Hal.Options.Wording
   alias Robot.Board

@@ -4,7 +4,7 @@ defmodule Console.Replay.Live do
   # the same again, how they were at a time, and why.
   alias Robot.Recording
   alias Console.Cli.Output
-  alias Console.Replay.{Asked, LiveText, Options}
+  alias Console.Replay.{Asked, Guard, LiveText, Options}
   alias Robot.Replay
 
   # So many differences are shown; the first ones explain the others.
@@ -51,6 +51,7 @@ defmodule Console.Replay.Live do
     run =
       file
       |> Recording.File.entries(until)
+      |> Guard.watched()
       |> Stream.filter(&asked?(&1, options.robot))
       |> Enum.reduce(
         %{

@@ -3,7 +3,7 @@ defmodule Console.Replay.Session do
   # Runs `mix replay FILE --step`: a person goes forwards and backwards in a run, and asks how the fleet stood at each
   # tick, and why. Reads commands (`Console.Replay.Command`) from standard input, a terminal or not, until its end.
   alias Console.Cli.{Format, Output, Progress}
-  alias Console.Replay.{Command, Difference, Moment, Options}
+  alias Console.Replay.{Command, Difference, Guard, Moment, Options}
   alias Sim.{Recording, Replay, Trial}
   alias Sim.Replay.Cursor
 
@@ -20,7 +20,7 @@ defmodule Console.Replay.Session do
     output = Output.to(:stdio)
 
     session = %{
-      cursor: Cursor.new(file.setup, &Recording.File.ticks(file, from_ms: &1)),
+      cursor: Cursor.new(file.setup, &Guard.watched(Recording.File.ticks(file, from_ms: &1))),
       options: options,
       names: for(robot <- file.setup.robots, do: Atom.to_string(robot.id)),
       last_ms: Recording.File.last_ms(file),

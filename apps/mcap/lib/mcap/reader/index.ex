@@ -33,10 +33,20 @@ defmodule Mcap.Reader.Index do
   end
 
   defp complete?(found, statistics) do
-    length(found.chunks) == statistics.chunks and (found.chunks != [] or statistics.count == 0) and
+    length(found.chunks) == statistics.chunks and apart?(found.chunks) and
+      (found.chunks != [] or statistics.count == 0) and
       map_size(found.channels) == statistics.channels and
       length(found.notes) == statistics.metadata and
       Enum.all?(Map.keys(statistics.counts), &is_map_key(found.channels, &1))
+  end
+
+  # A chunk that is listed again and again would make a small file a long one.
+  defp apart?(chunks) do
+    places = chunks |> Enum.map(&{&1.offset, &1.length}) |> Enum.sort()
+
+    places
+    |> Enum.zip(Enum.drop(places, 1))
+    |> Enum.all?(fn {{offset, length}, {next, _length}} -> offset + length <= next end)
   end
 
   defp records(<<>>, found), do: {:ok, found}

@@ -1,17 +1,19 @@
 defmodule Robot.Navigation.MapFile do
   @moduledoc """
   Reads and saves a floor plan as map_server writes it: a description in YAML (`.Description`) and the picture that it names,
-  PNG or PGM (`.Picture`). It gives a robot the walls of its building (`Robot.Navigation.Grid`) in the frame of the map, in
+  PNG, PGM or BMP (`.Picture`). It gives a robot the walls of its building (`Robot.Navigation.Grid`) in the frame of the map, in
   which the description says where the picture lies.
 
   What the picture does not cover is wall; so only the part of it with floor becomes the grid, and only that must not be
   larger than a robot can search for a way ten times a second.
   """
   alias Robot.Navigation.Grid
-  alias Robot.Navigation.MapFile.{Description, Pgm, Picture, Png, Writer}
+  alias Robot.Navigation.MapFile.{Bmp, Description, Pgm, Picture, Png, Turn, Writer}
 
   # A picture of 4000 x 4000 pixels, which some mappers always write, is read within seconds.
   @most_pixels 16_000_000
+  @most_text 65_536
+  @most_bytes 100_000_000
   # Cells of `Picture.cell/0`: 500 m.
   @most_side 10_000
   # Cells of the grid, 10 cm wide: 100 x 100 m.
@@ -31,7 +33,8 @@ defmodule Robot.Navigation.MapFile do
   @spec open(Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
   def open(file) do
     with {:ok, description} <- description(file),
-         {:ok, {width, height, _rows} = picture} <- picture(description.image, @most_pixels),
+         {:ok, {width, height, _rows} = picture} <-
+           picture(description.image, @most_pixels, description.transparent),
          size = {width * description.resolution, height * description.resolution},
          :ok <- size(file, Picture.cells(size)),
          {:ok, grid} <- grid(file, Picture.walls(picture, description.shades, size), description),
@@ -59,7 +62,7 @@ defmodule Robot.Navigation.MapFile do
   @doc "What a file describes; the path of its picture is complete. The error is one line that names the file."
   @spec description(Path.t()) :: {:ok, Description.t()} | {:error, line :: String.t()}
   def description(file) do
-    with {:ok, bytes} <- read(file),
+    with {:ok, bytes} <- read(file, @most_text),
          {:ok, description} <- Description.parse(bytes) do
       {:ok, %{description | image: Path.expand(description.image, Path.dirname(file))}}
     else
@@ -67,11 +70,15 @@ defmodule Robot.Navigation.MapFile do
     end
   end
 
-  @doc "The picture in a file, of at most so many pixels; the error is one line that names the file."
-  @spec picture(Path.t(), pos_integer()) :: {:ok, Picture.t()} | {:error, line :: String.t()}
-  def picture(file, most_pixels) do
-    with {:ok, bytes} <- read(file),
-         {:ok, picture} <- decode(bytes, most_pixels) do
+  @doc """
+  The picture in a file, of at most so many pixels; `transparent` is the shade of what is transparent in it, by default
+  white. The error is one line that names the file. What is too large is refused by its head.
+  """
+  @spec picture(Path.t(), pos_integer(), transparent :: byte()) ::
+          {:ok, Picture.t()} | {:error, line :: String.t()}
+  def picture(file, most_pixels, transparent \\ 255) do
+    with {:ok, bytes} <- read(file, @most_bytes),
+         {:ok, picture} <- decode(bytes, most_pixels, transparent) do
       {:ok, picture}
     else
       {:error, reason} -> {:error, "#{file}: #{reason}"}
@@ -79,29 +86,37 @@ defmodule Robot.Navigation.MapFile do
   end
 
   # Reading a device or a pipe would never end.
-  defp read(file) do
-    with {:ok, %File.Stat{type: :regular}} <- File.stat(file),
+  defp read(file, most) do
+    with {:ok, %File.Stat{type: :regular, size: size}} when size <= most <- File.stat(file),
          {:ok, bytes} <- File.read(file) do
       {:ok, String.replace_prefix(bytes, "\uFEFF", "")}
     else
-      {:ok, %File.Stat{type: type}} -> {:error, "is a #{type}, not a file"}
-      {:error, reason} -> {:error, :file.format_error(reason)}
+      {:ok, %File.Stat{type: :regular, size: size}} ->
+        {:error, "has #{size} bytes: up to #{most} are read"}
+
+      {:ok, %File.Stat{type: type}} ->
+        {:error, "is a #{type}, not a file"}
+
+      {:error, reason} ->
+        {:error, :file.format_error(reason)}
     end
   end
 
-  defp decode(<<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>>, most), do: Png.decode(chunks, most)
+  defp decode(<<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>>, most, transparent),
+    do: Png.decode(chunks, most, transparent)
 
-  defp decode(<<"P", kind, rest::binary>>, most) when kind in [?2, ?5],
+  defp decode(<<"P", kind, rest::binary>>, most, _transparent) when kind in [?2, ?5],
     do: Pgm.decode(kind, rest, most)
 
-  defp decode(bytes, _most) do
+  defp decode(<<"BM", rest::binary>>, most, _transparent), do: Bmp.decode(rest, most)
+
+  defp decode(bytes, _most, _transparent) do
     what = if kind = kind(bytes), do: "is #{kind}", else: "is no picture that is known"
-    {:error, "#{what}: PNG and PGM (P2, P5) are read; save it as PNG"}
+    {:error, "#{what}: PNG, PGM (P2, P5) and BMP are read; save it as PNG"}
   end
 
   defp kind(<<0xFF, 0xD8, 0xFF, _::binary>>), do: "a JPEG picture"
   defp kind(<<"GIF8", _::binary>>), do: "a GIF picture"
-  defp kind(<<"BM", _::binary>>), do: "a BMP picture"
   defp kind(<<"RIFF", _size::32, "WEBP", _::binary>>), do: "a WebP picture"
   defp kind(<<"II*", 0, _::binary>>), do: "a TIFF picture"
   defp kind(<<"MM", 0, "*", _::binary>>), do: "a TIFF picture"
@@ -121,16 +136,16 @@ defmodule Robot.Navigation.MapFile do
      "#{file}: is #{w} x #{h} m: 0.1 to 500 m are allowed for each side; see its resolution"}
   end
 
-  defp grid(file, rows, %{origin: {x, y}}) do
+  defp grid(file, rows, %{origin: origin}) do
     case floor_of(rows) do
       nil ->
         {:error,
          "#{file}: shows no floor: light pixels are floor, unless its negate says otherwise"}
 
-      {rows, {left, low}} ->
-        {w, h} = {byte_size(hd(rows)), length(rows)}
+      {rows, at} ->
         cell = Picture.cell()
-        corner = {x + left * cell, y + low * cell}
+        {rows, corner} = Turn.turn(rows, cell, beside(origin, at, cell))
+        {w, h} = {byte_size(hd(rows)), length(rows)}
 
         if w * h * cell * cell <= @most_grid * Grid.plan_cell() * Grid.plan_cell(),
           do: {:ok, Grid.plan(IO.iodata_to_binary(rows), {w, h}, cell, corner)},
@@ -139,6 +154,13 @@ defmodule Robot.Navigation.MapFile do
              "#{file}: has floor on #{round(w * cell)} x #{round(h * cell)} m: up to 100 x 100 m, or as large an " <>
                "area, are allowed"}
     end
+  end
+
+  # The pose of the cell in this column and row, of rows whose first cell has this one.
+  defp beside({x, y, turn}, {column, row}, cell) do
+    {cos, sin} = {:math.cos(turn), :math.sin(turn)}
+    {dx, dy} = {column * cell, row * cell}
+    {x + dx * cos - dy * sin, y + dx * sin + dy * cos, turn}
   end
 
   # The rows without what surrounds all floor, and the place of their lower left cell.

@@ -41,6 +41,7 @@ defmodule Sim.Fleet.Local do
       mission: setup.mission,
       plan: setup.plan,
       trace: options[:trace],
+      replace: options[:replace] || true,
       folder: folder
     }
 

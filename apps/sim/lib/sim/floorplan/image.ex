@@ -1,9 +1,9 @@
 defmodule Sim.Floorplan.Image do
   @moduledoc false
-  # Reads maps from files: a PNG or PGM picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
+  # Reads maps from files: a PNG, PGM or BMP picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
   # or a description in YAML as map_server writes it, `FILE.yaml`, which names the picture and says where the origin is.
   alias Robot.Navigation.MapFile
-  alias Robot.Navigation.MapFile.Picture
+  alias Robot.Navigation.MapFile.{Picture, Turn}
   alias Sim.Compute
   alias Sim.Floorplan.Maps
 
@@ -31,25 +31,43 @@ defmodule Sim.Floorplan.Image do
     with {:ok, {width, height} = size} <- size(size, "map #{name}"),
          :ok <- few("map #{name}", size),
          {:ok, picture} <- picture(file) do
-      plan(name, picture, Picture.shades(picture), size, {-width / 2, -height / 2})
+      walls = Picture.walls(picture, Picture.shades(picture), size)
+      plan(name, walls, size, {-width / 2, -height / 2})
     end
   end
 
   defp described(file) do
     with {:ok, description} <- file |> MapFile.description() |> about(),
-         {:ok, picture} <- picture(description.image) do
+         {:ok, picture} <- picture(description.image, description.transparent) do
       {width, height, _rows} = picture
-      {width, height} = {width * description.resolution, height * description.resolution}
-      {x, y} = description.origin
+      size = {width * description.resolution, height * description.resolution}
 
-      # The plan has its origin in the middle, so what the picture does not cover is added as wall.
-      whole = {2 * max(-x, x + width), 2 * max(-y, y + height)}
-
-      with :ok <- large_enough(file, {width, height}),
-           :ok <- around(file, description.origin, whole),
-           do: plan(file, picture, description.shades, {width, height}, description.origin)
+      with :ok <- large_enough(file, size),
+           :ok <- around(file, description.origin, whole(size, description.origin)) do
+        walls = Picture.walls(picture, description.shades, size)
+        {walls, corner} = Turn.turn(walls, Picture.cell(), description.origin)
+        plan(file, walls, turned(size, walls, description.origin), corner)
+      end
     end
   end
+
+  # The plan has its origin in the middle, so what the picture does not cover is added as wall.
+  defp whole({width, height}, {x, y, turn}) do
+    {cos, sin} = {:math.cos(turn), :math.sin(turn)}
+
+    corners =
+      for w <- [0.0, width],
+          h <- [0.0, height],
+          do: {x + w * cos - h * sin, y + w * sin + h * cos}
+
+    {xs, ys} = Enum.unzip(corners)
+    {2 * Enum.max(Enum.map(xs, &abs/1)), 2 * Enum.max(Enum.map(ys, &abs/1))}
+  end
+
+  defp turned(size, _walls, {_x, _y, turn}) when turn == 0.0, do: size
+
+  defp turned(_size, walls, _origin),
+    do: {byte_size(hd(walls)) * Picture.cell(), length(walls) * Picture.cell()}
 
   defp about({:error, line}), do: {:error, "map file #{line}"}
   defp about(ok), do: ok
@@ -61,7 +79,7 @@ defmodule Sim.Floorplan.Image do
     {:error, "map #{file}: it is #{size} m; each side must be at least 1 m: see its resolution"}
   end
 
-  defp around(file, {x, y}, {width, height} = whole) do
+  defp around(file, {x, y, _turn}, {width, height} = whole) do
     if Enum.all?([width, height], &(&1 > 0 and &1 <= @widest)) and few(file, whole) == :ok,
       do: :ok,
       else:
@@ -90,14 +108,14 @@ defmodule Sim.Floorplan.Image do
          "#{what}: too large, at most #{div(@most_cells, 1_000_000)} million cells of 5 cm are allowed"}
   end
 
-  defp picture(file), do: file |> MapFile.picture(@most_cells) |> about()
+  defp picture(file, transparent \\ 255),
+    do: file |> MapFile.picture(@most_cells, transparent) |> about()
 
-  # `corner` is where the lower left corner of the picture lies.
-  defp plan(name, picture, shades, {width, height} = size, {x, y}) do
+  # `{x, y}` is where the lower left corner of the walls lies.
+  defp plan(name, walls, {width, height} = size, {x, y}) do
     {columns, rows} = Picture.cells(size)
     {w, right} = middle(columns, x, width)
     {h, up} = middle(rows, y, height)
-    walls = Picture.walls(picture, shades, size)
     field = walls |> surround({w, h}, {columns, rows}, {right, up}) |> Compute.field(w, h)
     cell = Picture.cell()
     {left, low} = {(right - w / 2) * cell, (up - h / 2) * cell}

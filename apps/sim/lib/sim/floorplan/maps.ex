@@ -78,8 +78,8 @@ defmodule Sim.Floorplan.Maps do
 
     cond do
       file == "rooms" -> {"rooms:SEED, a whole number from #{first} to #{last},", ""}
-      kind in [".png", ".pgm"] and size == nil -> {sized(file), "; its size is missing"}
-      kind in [".png", ".pgm"] -> {sized(file), "; #{size} is not a size"}
+      kind in [".png", ".pgm", ".bmp"] and size == nil -> {sized(file), "; its size is missing"}
+      kind in [".png", ".pgm", ".bmp"] -> {sized(file), "; #{size} is not a size"}
       kind in [".yaml", ".yml"] -> {"FILE.yaml", "; its description says how large the map is"}
       kind != "" -> {"FILE.yaml, #{@picture}", "; #{kind} is not read: save the picture as PNG"}
       true -> {allowed(), Suggest.hint(name, names())}

@@ -34,6 +34,7 @@ defmodule Sim.Node.Robot do
       mission: options.mission,
       plan: options.plan,
       trace: nil,
+      replace: true,
       folder: options.folder
     }
 

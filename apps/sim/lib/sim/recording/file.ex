@@ -48,9 +48,11 @@ defmodule Sim.Recording.File do
       topics: [ticks],
       from_ns: Keyword.get(options, :from_ms, 0) * 1_000_000
     )
-    |> Stream.map(fn {_topic, _channel, _ns, bytes} ->
+    |> Stream.map(fn {_topic, _channel, ns, bytes} ->
       case Recording.read_tick(bytes) do
-        {:ok, tick} -> tick
+        # Else a tick of another time than its message's would hide all that come behind it.
+        {:ok, {at_ms, _entries} = tick} when at_ms * 1_000_000 == ns -> tick
+        {:ok, _tick} -> raise Mcap.DamagedError, message: "#{path} has a tick of the wrong time"
         {:error, line} -> raise Mcap.DamagedError, message: "#{path} #{line}"
       end
     end)

@@ -62,6 +62,51 @@ defmodule Sim.Floorplan.DescriptionTest do
     end
   end
 
+  test "a turned origin turns the plan round the lower left corner of the picture", %{
+    tmp_dir: dir
+  } do
+    File.write!(Path.join(dir, "floor.pgm"), picture())
+    file = Path.join(dir, "map.yaml")
+
+    for {x, y, turn} <- [
+          {2.0, -1.0, :math.pi() / 2},
+          {2.0, 1.5, :math.pi()},
+          {-1.0, 2.0, -:math.pi() / 2},
+          {1.5, 2.0, 3.14},
+          {-1.0, -1.0, 0.5}
+        ] do
+      File.write!(file, with_line("origin", "origin: [#{x}, #{y}, #{turn}]"))
+      assert {:ok, map} = Floorplan.open(file, 2)
+
+      for {i, j, wall?} <- [
+            {0.5, 0.25, true},
+            {0.2, 0.2, true},
+            {1.3, 0.25, false},
+            {0.5, 0.75, false},
+            {3.7, 2.7, false},
+            {3.7, 0.3, false},
+            {-0.15, 1.0, true},
+            {4.15, 1.0, true},
+            {2.0, 3.15, true}
+          ] do
+        {cos, sin} = {:math.cos(turn), :math.sin(turn)}
+        place = {x + i * cos - j * sin, y + i * sin + j * cos}
+        assert {turn, i, j, Floorplan.wall?(map, place)} == {turn, i, j, wall?}
+      end
+
+      # What robots know is the same floor.
+      {:ok, %{grid: grid}} = Robot.Navigation.MapFile.open(file)
+
+      for i <- -20..20, j <- -20..20, place = {i * 0.2 + 0.05, j * 0.2 + 0.05} do
+        if Robot.Navigation.Grid.clearance(grid, place) > 0.1,
+          do: refute(Floorplan.wall?(map, place), inspect({turn, place}))
+
+        if Floorplan.clearance(map, place, 0.3) > 0.2,
+          do: assert(Robot.Navigation.Grid.clearance(grid, place) > 0.0, inspect({turn, place}))
+      end
+    end
+  end
+
   test "a description that cannot be opened is one line", %{tmp_dir: dir} do
     File.write!(Path.join(dir, "floor.pgm"), picture())
     file = Path.join(dir, "map.yaml")
@@ -69,7 +114,7 @@ defmodule Sim.Floorplan.DescriptionTest do
     for {yaml, pattern} <- [
           {"resolution: 0.05\n", ~r/map.yaml: image is missing/},
           {with_line("image", "image: other.pgm"), ~r/other.pgm: no such file/},
-          {with_line("image", "image: map.yaml"), ~r/is no picture that is known: PNG and PGM/},
+          {with_line("image", "image: map.yaml"), ~r/is no picture that is known: PNG, PGM/},
           {with_line("resolution", "resolution: 0.01"),
            ~r/it is 0.80 x 0.60 m; each side must be at least 1 m/},
           {with_line("origin", "origin: [-1, 9000, 0]"), ~r/origin .* is too far from 0,0/},

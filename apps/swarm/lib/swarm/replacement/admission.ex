@@ -62,7 +62,7 @@ defmodule Swarm.Replacement.Admission do
     robots = Entries.meant(order)
     busy = Enum.filter(jobs, &busy?/1)
 
-    with :ok <- each(robots, &free(&1, busy)),
+    with :ok <- each(robots, &free(&1, order, busy)),
          {:ok, module, modules, earlier} <- Replacement.Code.check(order, loaded, kept),
          :ok <- alone(Keyword.keys(modules), robots, busy),
          do: {:ok, robots, module, modules, earlier}
@@ -85,7 +85,7 @@ defmodule Swarm.Replacement.Admission do
     end)
   end
 
-  defp free(id, busy) do
+  defp free(id, order, busy) do
     cond do
       Entries.held?(id) ->
         {:error, "it is held by the emergency stop; reset it first"}
@@ -94,7 +94,7 @@ defmodule Swarm.Replacement.Admission do
         {:error, "what it was given last is watched for #{@watch_s} s first"}
 
       true ->
-        Entries.allowed(id)
+        Entries.allowed(id, order.code != [])
     end
   end
 

@@ -7,7 +7,7 @@ defmodule Swarm.Replacement.Code do
   # (`Swarm.Missions.apps/0`): never to one that carries the robot.
   alias Hal.Options.Wording
   alias Swarm.Missions
-  alias Swarm.Replacement.Order
+  alias Swarm.Replacement.{ObjectCode, Order}
 
   # What carries the robot, even if somebody configures a mission of it.
   @carrying [:hal, :vision, :robot, :mesh, :swarm]
@@ -65,6 +65,10 @@ defmodule Swarm.Replacement.Code do
       {:error, line} when is_binary(line) -> {:error, line}
       _unreadable -> {:error, "the code cannot be read: it is no object code"}
     end
+  rescue
+    # What is inside a chunk is damaged.
+    _damaged in [ArgumentError, ErlangError, FunctionClauseError, MatchError, CaseClauseError] ->
+      {:error, "the code cannot be read: it is no object code"}
   end
 
   defp unzipped(<<31, 139, _rest::binary>> = beam), do: :zlib.gunzip(beam)
@@ -82,15 +86,7 @@ defmodule Swarm.Replacement.Code do
 
   defp shown({name, _beam}), do: Order.name(name)
 
-  defp mission?({_name, beam}) do
-    case :beam_lib.chunks(beam, [:attributes]) do
-      {:ok, {_module, [attributes: all]}} ->
-        Enum.any?(all, fn {key, value} -> key == :behaviour and Robot.Mission in value end)
-
-      {:error, :beam_lib, _reason} ->
-        false
-    end
-  end
+  defp mission?({name, beam}), do: ObjectCode.read(name, beam) == {:ok, true}
 
   @doc "The object code of all modules that may be replaced, from their files, before anybody changes these."
   @spec keep() :: store()
@@ -150,10 +146,7 @@ defmodule Swarm.Replacement.Code do
   defp whole(name, code) do
     wrong =
       Enum.find(code, fn {name, beam} ->
-        case :beam_lib.info(beam) do
-          info when is_list(info) -> Atom.to_string(info[:module]) != name
-          {:error, :beam_lib, _reason} -> true
-        end
+        ObjectCode.read(name, beam) == :error
       end)
 
     cond do

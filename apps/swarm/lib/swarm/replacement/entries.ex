@@ -15,12 +15,21 @@ defmodule Swarm.Replacement.Entries do
   @typedoc "What was put in the place of the mission of the robot's config, if anything (`Robot.Board`)."
   @type noted :: %{mission: Job.mission() | nil, changing?: boolean(), says: String.t()} | nil
 
-  @doc "Whether the robot's config allows it; the error is one line."
-  @spec allowed(atom()) :: :ok | {:error, line :: String.t()}
-  def allowed(robot) do
+  @doc "Whether the robot's config allows another mission, with `code?` one whose code comes along; the error is one line."
+  @spec allowed(atom(), code? :: boolean()) :: :ok | {:error, line :: String.t()}
+  def allowed(robot, code? \\ false) do
     case entry(robot, :release) do
-      %{replace: true} -> :ok
-      _off -> {:error, "its mission cannot be replaced: its file does not say replace: true"}
+      %{replace: :code} ->
+        :ok
+
+      %{replace: true} when code? ->
+        {:error, "it takes no code from others: its file does not say replace: :code"}
+
+      %{replace: true} ->
+        :ok
+
+      _off ->
+        {:error, "its mission cannot be replaced: its file does not say replace: true"}
     end
   end
 

@@ -6,7 +6,7 @@ defmodule Swarm.Replacement.Job do
   | phase | ends when | then |
   |---|---|---|
   | `:standing` | all that were on a mission have ended it, by way of their gates, and their wheels rest; 3 s at most | the code is loaded |
-  | `:loading` | the code is loaded | the mission is tried: its options are checked, and a state is made and thrown away |
+  | `:loading` | the code is loaded, in a VM of its own first; 10 s at most | the mission is tried: its options are checked, and a state is made and thrown away |
   | `:trying` | that has gone well; 2 s at most | those that were on a mission start it |
   | `:waiting` | a person starts the mission, because no robot was on one | it is watched |
   | `:watching` | 10 s have passed | it stays |
@@ -28,6 +28,7 @@ defmodule Swarm.Replacement.Job do
 
   @stand_ms 3_000
   @again_ms 500
+  @load_ms 10_000
   @try_ms 2_000
   @watch_ms 10_000
 
@@ -148,6 +149,12 @@ defmodule Swarm.Replacement.Job do
       now_ms - job.since_ms >= @stand_ms -> resume(job, "#{hd(late)} does not stand", [])
       true -> again(job, effects, now_ms)
     end
+  end
+
+  defp next(%{phase: :loading} = job, effects, _turning, now_ms) do
+    if now_ms - job.since_ms >= @load_ms,
+      do: resume(job, "loading its code does not end", effects),
+      else: {job, effects}
   end
 
   defp next(%{phase: :trying} = job, effects, _turning, now_ms) do

@@ -10,12 +10,16 @@ defmodule Swarm.Replacement.Order do
   # The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
   # robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
   # for half a second, and a robot takes one of each time.
+  alias Hal.ExternalTerm
   alias Swarm.Order.Freshness
   alias Swarm.Wire
 
   @label "convoy replacement 1"
   # An order must arrive within half a second. The largest mission in the box takes a third of it.
   @most_bytes 131_072
+  # What it takes in memory, unpacked; and so its options alone.
+  @most_memory 1_000_000
+  @most_options 65_536
   @most_name 255
 
   @enforce_keys [:id, :from, :to, :mission, :options]
@@ -48,17 +52,32 @@ defmodule Swarm.Replacement.Order do
     term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
     content = :erlang.term_to_binary(term, [:compressed])
 
-    if byte_size(content) <= @most_bytes,
-      do: {:ok, content},
-      else:
+    cond do
+      byte_size(content) > @most_bytes ->
+        large(order, "#{div(@most_bytes, 1024)} kB", byte_size(content))
+
+      not ExternalTerm.decodable?(term, @most_memory) ->
+        large(order, "#{div(@most_memory, 1_000)} kB, unpacked", :erlang.external_size(term))
+
+      not ExternalTerm.bounded?(order.options, @most_options) ->
         {:error,
-         "#{name(order.mission)}: expected code of at most #{div(@most_bytes, 1024)} kB, got #{div(byte_size(content), 1024)} kB"}
+         "options: expected data of at most #{div(@most_options, 1024)} kB, without processes and functions"}
+
+      true ->
+        {:ok, content}
+    end
   end
+
+  defp large(order, most, bytes),
+    do:
+      {:error,
+       "#{name(order.mission)}: expected code of at most #{most}, got #{div(bytes, 1024)} kB"}
 
   @doc "The order of bytes whose signature was checked; `:error` for anything else."
   @spec decode(binary()) :: {:ok, t()} | :error
   def decode(content) do
-    with {1, <<_::128>> = id, from, to, mission, options, code} <- term(content),
+    with {:ok, {1, <<_::128>> = id, from, to, mission, options, code}} <-
+           ExternalTerm.decode(content, @most_memory),
          true <- name?(from) and name?(mission) and is_binary(options),
          true <- Wire.list?(to, &name?/1) and Wire.list?(code, &code?/1) do
       {:ok,
@@ -75,15 +94,10 @@ defmodule Swarm.Replacement.Order do
   @doc "The options of an order; `:error` if they name what this node does not know."
   @spec options(t()) :: {:ok, keyword()} | :error
   def options(%__MODULE__{options: encoded}) do
-    options = term(encoded)
-    if Keyword.keyword?(options), do: {:ok, options}, else: :error
-  end
-
-  defp term(bytes) do
-    :erlang.binary_to_term(bytes, [:safe])
-  rescue
-    # An atom that is not known here, or no term.
-    ArgumentError -> :error
+    with {:ok, options} <- ExternalTerm.decode(encoded, @most_options),
+         true <- Keyword.keyword?(options),
+         do: {:ok, options},
+         else: (_no -> :error)
   end
 
   defp name?(text), do: is_binary(text) and byte_size(text) in 1..@most_name
@@ -109,7 +123,7 @@ defmodule Swarm.Replacement.Order do
     md5s |> :erlang.md5() |> Base.encode16(case: :lower) |> binary_part(0, 8)
   end
 
-  # Of what is executed, without debug information.
+  # Of what is executed, without debug information; of checked code.
   defp md5(beam) do
     case :beam_lib.md5(beam) do
       {:ok, {_module, md5}} -> md5

@@ -7,9 +7,9 @@ defmodule Swarm.Replacement.Server do
   alias Swarm.Replacement
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Nonblocking, Secret}
-  alias Robot.{Mission, Names}
+  alias Robot.Names
   alias Robot.Control.{Delivery, Pilot}
-  alias Swarm.Replacement.{Admission, Entries, Job, Order}
+  alias Swarm.Replacement.{Admission, Entries, Job, Order, Rehearsal}
 
   @tick_ms 50
   @start_ms 2_000
@@ -208,7 +208,7 @@ defmodule Swarm.Replacement.Server do
 
     for {monitor, what} <- over do
       Process.demonitor(monitor, [:flush])
-      with {:try, ^id, pid} <- what, do: Process.exit(pid, :kill)
+      with {kind, ^id, pid} when kind in [:load, :try] <- what, do: Process.exit(pid, :kill)
     end
 
     s = %{s | jobs: Map.delete(s.jobs, id), monitors: Map.new(monitors)}
@@ -223,19 +223,12 @@ defmodule Swarm.Replacement.Server do
     s
   end
 
-  defp effect(:load, id, %{modules: modules, earlier: earlier}, s) do
-    result = Replacement.Code.load(modules)
+  defp effect(:load, id, %{modules: []}, s), do: step(s, id, {:loaded, :ok})
 
-    s =
-      if result == :ok,
-        do: %{
-          s
-          | loaded: Map.merge(s.loaded, Map.new(modules)),
-            release: Map.merge(Map.new(earlier), s.release)
-        },
-        else: s
-
-    step(s, id, {:loaded, result})
+  # What aborts a VM must not abort this one.
+  defp effect(:load, id, %{modules: modules}, s) do
+    {pid, monitor} = spawn_monitor(fn -> exit({:rehearsed, Rehearsal.load(modules)}) end)
+    put_in(s.monitors[monitor], {:load, id, pid})
   end
 
   defp effect(:restore, _id, %{earlier: earlier}, s), do: restore(earlier, s)
@@ -243,7 +236,9 @@ defmodule Swarm.Replacement.Server do
   defp effect(:try, id, %{order: order, job: %{mission: {module, _}} = job}, s) do
     robots = Map.keys(job.robots)
     # It is foreign code, which may do anything but return.
-    {pid, monitor} = spawn_monitor(fn -> exit({:tried, try_out(module, order, robots)}) end)
+    {pid, monitor} =
+      spawn_monitor(fn -> exit({:tried, Rehearsal.init(module, order, robots)}) end)
+
     put_in(s.monitors[monitor], {:try, id, pid})
   end
 
@@ -270,22 +265,27 @@ defmodule Swarm.Replacement.Server do
     s
   end
 
-  defp try_out(module, order, robots) do
-    with {:ok, options} <- options(order),
-         {:ok, options} <- Mission.check_options(module, options, length(robots)) do
-      for robot <- robots do
-        {phase, _mission, effects} = module.init(robot, options)
-        true = is_atom(phase) and is_list(effects)
-      end
+  defp ended({:load, id, _pid}, {:rehearsed, :ok}, s) do
+    %{modules: modules, earlier: earlier} = s.jobs[id]
+    result = Replacement.Code.load(modules)
 
-      {:ok, options}
-    end
+    s =
+      if result == :ok,
+        do: %{
+          s
+          | loaded: Map.merge(s.loaded, Map.new(modules)),
+            release: Map.merge(Map.new(earlier), s.release)
+        },
+        else: s
+
+    step(s, id, {:loaded, result})
   end
 
-  defp options(order) do
-    with :error <- Order.options(order),
-         do: {:error, "its options have names that its code does not know"}
-  end
+  defp ended({:load, id, _pid}, {:rehearsed, error}, s), do: step(s, id, {:loaded, error})
+
+  defp ended({:load, id, _pid}, _aborted, s),
+    do:
+      step(s, id, {:loaded, {:error, "its code cannot be loaded: a VM that tried it has ended"}})
 
   defp ended({:try, id, _pid}, {:tried, result}, s), do: step(s, id, {:tried, result})
 

@@ -27,7 +27,7 @@ defmodule Swarm.Replacement.NodesTest do
     [good, crash] =
       for {n, kind} <- [{1, :good}, {2, :crash}], do: Versions.code(Ours.Nodes1, n, kind)
 
-    for node <- [one, two], do: start(node, replace: true)
+    for node <- [one, two], do: start(node, replace: :code)
     start(shut, [])
     names = for node <- [one, two, shut], do: node.name
     for node <- nodes, do: eventually(fn -> names -- ask(node, :find, []) == [] end)
@@ -49,7 +49,7 @@ defmodule Swarm.Replacement.NodesTest do
 
     MeshNodes.signal(two, "KILL")
     two = MeshNodes.join(nodes, two.name)
-    start(two, replace: true)
+    start(two, replace: :code)
     refute MeshNodes.call(two, :erlang, :module_loaded, [Ours.Nodes1])
     eventually(fn -> two.name in ask(base, :find, []) end)
     assert order(fn -> ask(base, :tell, [two.name, "start"]) end) == :ok

@@ -72,6 +72,16 @@ defmodule Swarm.Replacement.OrderTest do
 
     assert Order.encode(new(code: code)) ==
              {:error, "Ours.Gather: expected code of at most 128 kB, got 128 kB"}
+
+    # Zeros take no room on their way.
+    zeros = [{"Elixir.Ours.Gather", :binary.copy(<<0>>, 2_048_000)}]
+
+    assert Order.encode(new(code: zeros)) ==
+             {:error, "Ours.Gather: expected code of at most 1000 kB, unpacked, got 2000 kB"}
+
+    order = new(code: zeros)
+    term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
+    assert Order.decode(:erlang.term_to_binary(term, [:compressed])) == :error
   end
 
   test "what is signed differs by robot, time and content, and only the whole signature is one" do

@@ -13,7 +13,7 @@ defmodule Swarm.Replacement.VersionTest do
   end
 
   defp replaceable(id, options \\ []) do
-    robot(id, [replace: true] ++ options)
+    robot(id, [replace: :code] ++ options)
     standing([id])
     assert order(fn -> Swarm.start(StandMission, robots: [id], formation: :wedge) end) == :ok
     id
@@ -77,7 +77,7 @@ defmodule Swarm.Replacement.VersionTest do
     # As its supervisor starts it again.
     stop_supervised!(id)
     eventually(fn -> not :erlang.module_loaded(Ours.Version1) end)
-    robot(id, replace: true)
+    robot(id, replace: :code)
     assert order(fn -> Swarm.tell(id, "start") end) == :ok
     assert {StandMission, :stand} = mission(id).state
     assert Swarm.status(id).replaced == nil

@@ -2,22 +2,28 @@ defmodule Robot.Navigation.MapFile.Description do
   @moduledoc false
   # Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
   # (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
-  # corner of the picture lies), and optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
+  # corner of the picture lies, and how far it is turned round that, counterclockwise in radians), and
+  # optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
   # Read as data: no other YAML is understood, other keys are ignored. Pure.
   #
   # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
   # surely free, less than `free_thresh`, is wall; so is 205, which map_server writes for what it does
-  # not know.
+  # not know, and what is transparent, which gets a shade (`transparent`) that is wall. With `mode: raw` the shades are no
+  # shades but the share in per cent, and what is above 100 is unknown.
 
-  @enforce_keys [:image, :resolution, :origin, :shades]
+  @enforce_keys [:image, :resolution, :origin, :shades, :transparent]
   defstruct @enforce_keys
 
   @type t :: %__MODULE__{
           image: String.t(),
           resolution: float(),
-          origin: {float(), float()},
-          shades: Robot.Navigation.MapFile.Runs.marks()
+          origin: {x :: float(), y :: float(), turn :: float()},
+          shades: Robot.Navigation.MapFile.Runs.marks(),
+          transparent: byte()
         }
+
+  # Radians; a whole turn is as good as none, and a number of degrees is a mistake.
+  @most_turn 6.3
 
   @needed ~w(image resolution origin)
   @known @needed ++ ~w(occupied_thresh free_thresh negate mode)
@@ -28,7 +34,7 @@ defmodule Robot.Navigation.MapFile.Description do
       iex> yaml = "image: floor.pgm\\nresolution: 0.05\\norigin: [-8.0, -6.0, 0.0]\\n"
       iex> {:ok, description} = Robot.Navigation.MapFile.Description.parse(yaml)
       iex> {description.image, description.resolution, description.origin}
-      {"floor.pgm", 0.05, {-8.0, -6.0}}
+      {"floor.pgm", 0.05, {-8.0, -6.0, 0.0}}
       iex> Robot.Navigation.MapFile.Description.parse("image: floor.pgm")
       {:error, "resolution is missing; needed are image, resolution, origin"}
   """
@@ -41,11 +47,16 @@ defmodule Robot.Navigation.MapFile.Description do
          {:ok, occupied} <- number(keys, "occupied_thresh", 0.65, 0.0, 1.0),
          {:ok, free} <- number(keys, "free_thresh", min(0.196, occupied), 0.0, 1.0),
          {:ok, light?} <- negate(Map.get(keys, "negate", "0")),
-         :ok <- mode(Map.get(keys, "mode", "trinary")) do
-      shades = shades(min(free, occupied), light?)
-
+         {:ok, mode} <- mode(Map.get(keys, "mode", "trinary"), light?),
+         :ok <- some_floor(min(free, occupied)) do
       {:ok,
-       struct!(__MODULE__, image: image, resolution: resolution, origin: origin, shades: shades)}
+       struct!(__MODULE__,
+         image: image,
+         resolution: resolution,
+         origin: origin,
+         shades: shades(mode, min(free, occupied), light?),
+         transparent: if(mode == :raw or light?, do: 254, else: 0)
+       )}
     end
   end
 
@@ -115,7 +126,7 @@ defmodule Robot.Navigation.MapFile.Description do
   defp image(%{"image" => text}) do
     case unquoted(text) do
       {:ok, file} when file != "" -> {:ok, file}
-      _none -> {:error, "image: expected the name of a PNG or PGM file"}
+      _none -> {:error, "image: expected the name of a PNG, PGM or BMP file"}
     end
   end
 
@@ -154,16 +165,14 @@ defmodule Robot.Navigation.MapFile.Description do
 
   defp origin(text) do
     with [_, inner] <- Regex.run(~r/^\[(.*)\]$/, text),
-         [x, y | turn] when length(turn) <= 1 <-
-           inner |> String.split(",") |> Enum.map(&String.trim/1),
-         [x, y] = [parsed(x), parsed(y)],
-         true <- is_float(x) and is_float(y) and abs(x) <= 1.0e6 and abs(y) <= 1.0e6 do
-      if Enum.all?(turn, &(parsed(&1) in [0.0, -0.0])),
-        do: {:ok, {x, y}},
-        else:
-          {:error, "origin #{text} is turned, which is not supported: turn the picture instead"}
+         [_x, _y | turn] = parts when length(turn) <= 1 <-
+           inner |> String.split(",") |> Enum.map(&parsed(String.trim(&1))),
+         true <- Enum.all?(parts, &is_float/1),
+         [x, y, turn | _] = parts ++ [0.0],
+         true <- abs(x) <= 1.0e6 and abs(y) <= 1.0e6 and abs(turn) <= @most_turn do
+      {:ok, {x, y, turn + 0.0}}
     else
-      _other -> {:error, "origin: expected [x, y, 0.0] in metres, got #{text}"}
+      _other -> {:error, "origin: expected [x, y, turn] in metres and radians, got #{text}"}
     end
   end
 
@@ -171,10 +180,27 @@ defmodule Robot.Navigation.MapFile.Description do
   defp negate(text) when text in ~w(1 true), do: {:ok, true}
   defp negate(text), do: {:error, "negate: expected 0 or 1, got #{text}"}
 
-  defp mode(text) when text in ~w(trinary scale), do: :ok
-  defp mode(text), do: {:error, "mode: expected trinary or scale, got #{text}"}
+  defp mode(text, _light?) when text in ~w(trinary scale), do: {:ok, :shades}
+  defp mode("raw", false), do: {:ok, :raw}
 
-  defp shades(free, light?) do
+  defp mode("raw", true),
+    do:
+      {:error,
+       "mode: raw with negate: 1 means one thing in ROS 1 and another in ROS 2; invert the picture"}
+
+  defp mode(text, _light?), do: {:error, "mode: expected trinary, scale or raw, got #{text}"}
+
+  defp some_floor(free) when free > 0.0, do: :ok
+
+  defp some_floor(_nothing_free),
+    do:
+      {:error,
+       "free_thresh: 0 leaves no floor: this is a mask, of speeds or of zones, and no floor plan"}
+
+  defp shades(:raw, free, _light?),
+    do: Robot.Navigation.MapFile.Runs.marks(&(&1 > 100 or &1 / 100 >= free))
+
+  defp shades(:shades, free, light?) do
     Robot.Navigation.MapFile.Runs.marks(fn shade ->
       occupied = if light?, do: shade / 255, else: (255 - shade) / 255
       occupied >= free or (shade == 205 and not light?)

@@ -17,19 +17,9 @@ defmodule Robot.Navigation.MapFile.Pgm do
     with {:ok, width, bytes} <- number(bytes),
          {:ok, height, bytes} <- number(bytes),
          {:ok, most, <<blank, bytes::binary>>} when blank in ~c" \t\r\n" <- number(bytes) do
-      cond do
-        width < 1 or height < 1 or most < 1 ->
-          @damaged
-
-        width * height > most_pixels ->
-          {:error, "#{width} x #{height} pixels are too many"}
-
-        most > 65_535 ->
-          @damaged
-
-        true ->
-          pixels(kind, bytes, width, height, most)
-      end
+      with true <- most in 1..65_535 || @damaged,
+           :ok <- Picture.size(width, height, most_pixels),
+           do: pixels(kind, bytes, width, height, most)
     else
       _ -> @damaged
     end
@@ -55,7 +45,7 @@ defmodule Robot.Navigation.MapFile.Pgm do
   end
 
   defp pixels(?2, bytes, width, height, most) do
-    case plain(bytes, width * height, most, []) do
+    case plain(bytes, width * height, most, <<>>) do
       {:ok, pixels} -> {:ok, {width, height, cut(pixels, width)}}
       :error -> @damaged
     end
@@ -63,11 +53,11 @@ defmodule Robot.Navigation.MapFile.Pgm do
 
   defp pixels(_kind, _bytes, _width, _height, _most), do: @damaged
 
-  defp plain(_bytes, 0, _most, done), do: {:ok, done |> Enum.reverse() |> IO.iodata_to_binary()}
+  defp plain(_bytes, 0, _most, done), do: {:ok, done}
 
   defp plain(bytes, left, most, done) do
     case number(bytes) do
-      {:ok, grey, bytes} -> plain(bytes, left - 1, most, [shade(grey, most) | done])
+      {:ok, grey, bytes} -> plain(bytes, left - 1, most, <<done::binary, shade(grey, most)>>)
       :error -> :error
     end
   end

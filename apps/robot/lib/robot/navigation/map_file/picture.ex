@@ -16,6 +16,26 @@ defmodule Robot.Navigation.MapFile.Picture do
   @speck_pixels 3
   @speck_m 0.15
 
+  # A row takes its time however short it is.
+  @most_side 20_000
+
+  @doc "Whether a picture of so many pixels is read, by its head; `most` is how many it may have. The error is one line."
+  @spec size(integer(), integer(), most :: pos_integer()) :: :ok | {:error, String.t()}
+  def size(width, height, most) do
+    cond do
+      width < 1 or height < 1 ->
+        {:error, "the picture is damaged"}
+
+      width > @most_side or height > @most_side or width * height > most ->
+        {:error,
+         "#{width} x #{height} pixels are too many: up to #{@most_side} a side and #{div(most, 1_000_000)} " <>
+           "million in all are read"}
+
+      true ->
+        :ok
+    end
+  end
+
   @doc "Which shades are wall in a picture without a description."
   @spec shades(t()) :: Runs.marks()
   def shades({_width, _height, rows}) do

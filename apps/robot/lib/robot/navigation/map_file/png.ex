@@ -1,20 +1,25 @@
 defmodule Robot.Navigation.MapFile.Png do
   @moduledoc false
   # Reads PNG pictures: grey of 1, 2, 4, 8 or 16 bits, grey with alpha, RGB, RGBA of 8 or 16 bits a channel, and palettes;
-  # also interlaced ones (`Robot.Navigation.MapFile.Adam7`). Colours become greys, what is transparent white. Pure.
+  # also interlaced ones (`Robot.Navigation.MapFile.Adam7`). Colours become greys, what is transparent white, or of another
+  # shade if it means something else: then what is less than half opaque has that, and the rest its own. Pure.
   alias Robot.Navigation.MapFile.{Adam7, Picture}
 
   @damaged {:error, "the picture is damaged"}
 
   @doc """
-  Reads the picture in the chunks after the signature; it may have at most `most` pixels. Beside
-  the answer it holds no more than a few rows at a time.
+  Reads the picture in the chunks after the signature; it may have at most `most` pixels, `transparent` is the shade of what
+  is transparent. Beside the answer it holds no more than a few rows at a time.
   """
-  @spec decode(binary(), pos_integer()) :: {:ok, Picture.t()} | {:error, String.t()}
-  def decode(chunks, most) do
+  @spec decode(binary(), pos_integer(), transparent :: byte()) ::
+          {:ok, Picture.t()} | {:error, String.t()}
+  def decode(chunks, most, transparent) do
     with {:ok, [{"IHDR", header} | chunks]} <- chunks(chunks, []),
          {:ok, %{width: width, height: height} = header} <- header(header, most),
-         {:ok, rows} <- inflate(for({"IDAT", data} <- chunks, do: data), header, palette(chunks)) do
+         {:ok, clear} <- clear(header, chunks),
+         header = Map.merge(header, %{transparent: transparent, clear: clear}),
+         {:ok, palette} <- palette(header, chunks),
+         {:ok, rows} <- inflate(for({"IDAT", data} <- chunks, do: data), header, palette) do
       if Enum.all?(rows, &(byte_size(&1) == width)),
         do: {:ok, {width, height, rows}},
         else: @damaged
@@ -42,18 +47,13 @@ defmodule Robot.Navigation.MapFile.Png do
 
   defp header(<<width::32, height::32, depth, type, 0, 0, interlace>>, most)
        when is_map_key(@channels, type) and width > 0 and height > 0 and interlace in 0..1 do
-    cond do
-      depth not in [1, 2, 4, 8, 16] or (depth < 8 and type not in [0, 3]) ->
-        @damaged
-
-      depth == 16 and type == 3 ->
-        @damaged
-
-      width * height > most ->
-        {:error, "#{width} x #{height} pixels are too many"}
-
-      true ->
-        {:ok, %{width: width, height: height, depth: depth, type: type, interlace: interlace}}
+    with false <- depth not in [1, 2, 4, 8, 16] or (depth < 8 and type not in [0, 3]),
+         false <- depth == 16 and type == 3,
+         :ok <- Picture.size(width, height, most) do
+      {:ok, %{width: width, height: height, depth: depth, type: type, interlace: interlace}}
+    else
+      true -> @damaged
+      {:error, line} -> {:error, line}
     end
   end
 
@@ -129,16 +129,36 @@ defmodule Robot.Navigation.MapFile.Png do
     end
   end
 
-  defp palette(chunks) do
+  # Of grey and of RGB one colour may be transparent, given in two bytes a channel.
+  defp clear(%{type: type, depth: depth}, chunks) when type in [0, 2] do
+    width = if type == 0, do: 2, else: 6
+
+    case List.keyfind(chunks, "tRNS", 0) do
+      nil -> {:ok, nil}
+      {_, colour} when byte_size(colour) != width -> @damaged
+      {_, colour} when depth == 16 -> {:ok, colour}
+      {_, colour} -> {:ok, for(<<sample::16 <- colour>>, into: <<>>, do: <<sample>>)}
+    end
+  end
+
+  defp clear(_header, _chunks), do: {:ok, nil}
+
+  defp palette(%{type: 3} = header, chunks) do
     {_, colours} = List.keyfind(chunks, "PLTE", 0, {"PLTE", <<>>})
     {_, alphas} = List.keyfind(chunks, "tRNS", 0, {"tRNS", <<>>})
-    alphas = :binary.bin_to_list(alphas)
 
-    for {<<rgb::binary-size(3)>>, k} <-
-          Enum.with_index(for <<c::binary-size(3) <- colours>>, do: c),
-        into: %{},
-        do: {k, grey(rgb, Enum.at(alphas, k, 255))}
+    if byte_size(colours) <= 768 and byte_size(alphas) <= 256 do
+      alphas = :binary.bin_to_list(alphas)
+      colours = Enum.with_index(for <<c::binary-size(3) <- colours>>, do: c)
+
+      {:ok,
+       for({rgb, k} <- colours, into: %{}, do: {k, grey(rgb, Enum.at(alphas, k, 255), header)})}
+    else
+      @damaged
+    end
   end
+
+  defp palette(_header, _chunks), do: {:ok, nil}
 
   # Takes the whole rows; returns the bytes of the one that has only begun.
   defp rows(bytes, %{stride: stride, left: left} = scan)
@@ -198,20 +218,54 @@ defmodule Robot.Navigation.MapFile.Png do
     defp samples(bytes, unquote(depth)), do: for(<<s::size(unquote(depth)) <- bytes>>, do: s)
   end
 
-  defp greys(row, width, %{depth: depth, type: type}, palette) do
-    bytes = row |> :binary.list_to_bin() |> upper(depth)
+  defp greys(row, width, %{depth: depth, type: type, clear: clear} = header, palette) do
+    raw = :binary.list_to_bin(row)
+    bytes = if clear, do: raw, else: upper(raw, depth)
 
     case type do
-      0 when depth >= 8 -> bytes
-      0 -> for s <- samples(bytes, depth), into: <<>>, do: <<div(255 * s, white(depth))>>
-      2 -> for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: <<grey(rgb, 255)>>
+      _ when clear != nil ->
+        cleared(bytes, clear, header)
+
+      0 when depth >= 8 ->
+        bytes
+
+      0 ->
+        for s <- samples(bytes, depth), into: <<>>, do: <<div(255 * s, white(depth))>>
+
+      2 ->
+        for <<rgb::binary-size(3) <- bytes>>, into: <<>>, do: <<grey(rgb, 255, header)>>
+
       # A colour that the palette does not have is black.
-      3 -> for k <- samples(bytes, depth), into: <<>>, do: <<Map.get(palette, k, 0)>>
-      4 -> for <<g, alpha <- bytes>>, into: <<>>, do: <<grey(<<g, g, g>>, alpha)>>
-      6 -> for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: <<grey(rgb, alpha)>>
+      3 ->
+        for k <- samples(bytes, depth), into: <<>>, do: <<Map.get(palette, k, 0)>>
+
+      4 ->
+        for <<g, alpha <- bytes>>, into: <<>>, do: <<grey(<<g, g, g>>, alpha, header)>>
+
+      6 ->
+        for <<rgb::binary-size(3), alpha <- bytes>>, into: <<>>, do: <<grey(rgb, alpha, header)>>
     end
     # The last byte of a row may hold more pixels than the row has.
     |> binary_part(0, width)
+  end
+
+  # All bytes of a pixel are compared, also those of its lower eight bits.
+  defp cleared(bytes, <<clear>>, %{type: 0, depth: depth} = header) when depth < 8 do
+    for s <- samples(bytes, depth),
+        into: <<>>,
+        do: <<if(s == clear, do: header.transparent, else: div(255 * s, white(depth)))>>
+  end
+
+  defp cleared(bytes, clear, %{depth: depth} = header) do
+    size = byte_size(clear)
+
+    for <<pixel::binary-size(size) <- bytes>>, into: <<>> do
+      case upper(pixel, depth) do
+        _colour when pixel == clear -> <<header.transparent>>
+        <<_grey>> = grey -> grey
+        rgb -> <<grey(rgb, 255, header)>>
+      end
+    end
   end
 
   # Of 16 bits the upper eight.
@@ -219,6 +273,10 @@ defmodule Robot.Navigation.MapFile.Png do
   defp upper(bytes, _depth), do: bytes
 
   defp white(depth), do: Bitwise.bsl(1, depth) - 1
+
+  defp grey(_rgb, alpha, %{transparent: shade}) when alpha < 128 and shade != 255, do: shade
+  defp grey(rgb, _alpha, %{transparent: shade}) when shade != 255, do: grey(rgb, 255)
+  defp grey(rgb, alpha, _on_white), do: grey(rgb, alpha)
 
   # On a white background.
   defp grey(<<r, g, b>>, alpha),

@@ -26,7 +26,7 @@ defmodule Robot.Navigation.MapFile.Writer do
       true
       iex> {:ok, description} = Robot.Navigation.MapFile.Description.parse(IO.iodata_to_binary(yaml))
       iex> {description.image, description.resolution, description.origin}
-      {"found.pgm", 0.1, {-1.0, 0.5}}
+      {"found.pgm", 0.1, {-1.0, 0.5, 0.0}}
   """
   @spec encode(raster(), image :: String.t()) :: {yaml :: iodata(), pgm :: iodata()}
   def encode(%{width: width, height: height, cell: cell} = map, image) do

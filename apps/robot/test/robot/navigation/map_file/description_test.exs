@@ -17,7 +17,7 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
     do: String.replace(@yaml, ~r/^#{key}:.*$/m, line)
 
   test "what map_server writes is read, also with quotes, remarks, a list of lines and \\r\\n" do
-    assert {:ok, %{image: "floor.pgm", resolution: 0.05, origin: {-1.0, -3.0}}} =
+    assert {:ok, %{image: "floor.pgm", resolution: 0.05, origin: {-1.0, -3.0, 0.0}}} =
              Description.parse(@yaml)
 
     for yaml <- [
@@ -61,6 +61,28 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
     assert walls.(with_line("free_thresh", "free_thresh: 0.25")) == Enum.to_list(0..191) ++ [205]
     assert walls.(with_line("free_thresh", "")) == Enum.to_list(0..205)
     assert walls.(with_line("negate", "negate: 1")) == Enum.to_list(50..255)
+    assert walls.(with_line("mode", "mode: scale")) == Enum.to_list(0..205)
+    # The shares themselves, in per cent; above 100 it is unknown.
+    assert walls.(with_line("mode", "mode: raw")) == Enum.to_list(20..255)
+  end
+
+  test "an origin may be turned, and what is transparent gets a shade that is wall" do
+    for {turn, read} <- [{"3.14", 3.14}, {"-1.5708", -1.5708}, {"-0.0", 0.0}] do
+      assert {:ok, %{origin: {25.9, 48.5, ^read}}} =
+               Description.parse(with_line("origin", "origin: [25.9, 48.5, #{turn}]"))
+    end
+
+    for {key, line} <- [
+          {"mode", ""},
+          {"negate", "negate: 1"},
+          {"mode", "mode: raw"},
+          {"mode", "mode: scale"}
+        ] do
+      assert {:ok, %{shades: shades, transparent: shade}} =
+               Description.parse(with_line(key, line))
+
+      assert elem(shades, shade)
+    end
   end
 
   test "each mistake is one line that says what is allowed" do
@@ -73,14 +95,22 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
            ~r/^resolution: expected a number from 0.001/},
           {with_line("resolution", "resolution: 1e99"), ~r/^resolution: expected .*, got 1e99/},
           {with_line("resolution", "resolution: 1e-99"), ~r/^resolution: expected .*, got 1e-99/},
-          {with_line("origin", "origin: 3"), ~r/^origin: expected \[x, y, 0.0\]/},
+          {with_line("origin", "origin: 3"),
+           ~r/^origin: expected \[x, y, turn\] in metres and radians/},
           {with_line("origin", "origin: [1.0]"), ~r/^origin: expected/},
           {with_line("origin", "origin: [a, b, c]"), ~r/^origin: expected/},
-          {with_line("origin", "origin: [0, 0, 1.57]"), ~r/^origin .* is turned/},
+          {with_line("origin", "origin: [0, 0, 90]"),
+           ~r/^origin: expected .* radians, got \[0, 0, 90\]/},
+          {with_line("origin", "origin: [0, 0, .nan]"), ~r/^origin: expected/},
+          {with_line("free_thresh", "free_thresh: 0.0"),
+           ~r/^free_thresh: 0 leaves no floor: this is a mask/},
           {with_line("occupied_thresh", "occupied_thresh: 7"),
            ~r/^occupied_thresh: expected .*, got 7/},
           {with_line("negate", "negate: 2"), ~r/^negate: expected 0 or 1/},
-          {with_line("mode", "mode: raw"), ~r/^mode: expected .*, got raw/},
+          {with_line("mode", "mode: costs"),
+           ~r/^mode: expected trinary, scale or raw, got costs/},
+          {String.replace(with_line("mode", "mode: raw"), "negate: 0", "negate: 1"),
+           ~r/^mode: raw with negate: 1 means one thing in ROS 1/},
           {@yaml <> "resolution: 0.1\n", ~r/^resolution is given twice$/},
           {@yaml <> "origin:\n- 0\n- 0\n", ~r/^origin is given twice$/},
           {with_line("origin", "origin:\n- -1.0 -3.0\n- 0.0"), ~r/^origin: expected/},
