@@ -29,7 +29,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Mission.Manual
   alias Robot.Navigation.{Grid, Reach}
   alias Mesh.Nonblocking
-  alias Swarm.{Missions, Replacement, Status}
+  alias Swarm.{Behaviours, Missions, Replacement, Status}
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
@@ -141,6 +141,12 @@ defmodule Swarm.Comms.CommandHandler do
     with {:ok, _order} <- Order.check({:start, mission, options}),
          {:ok, {module, options}} <- Missions.choose({mission, options}, nil),
          do: {:ok, {:start, module, options}}
+  end
+
+  defp checked({:run, behaviour, options}, _config) do
+    with {:ok, _order} <- Order.check({:run, behaviour, options}),
+         {:ok, {module, options}} <- Behaviours.choose(behaviour, options),
+         do: {:ok, {:run, module, options}}
   end
 
   defp checked(request, _config), do: Order.check(request)
