@@ -211,6 +211,18 @@ defmodule Swarm do
   @spec status(robot()) :: Status.t() | {:error, String.t()}
   def status(robot), do: StatusReport.one(robot)
 
+  @doc """
+  What a robot's sonars measured last, wherever it is: for each where it is on the body (its pose there), and how far the
+  nearest thing is in metres. The error says why it is not known.
+
+      Swarm.sonar(:mag1)
+  """
+  @spec sonar(robot()) :: {:ok, [{Hal.Pose.t(), float()}]} | {:error, line :: String.t()}
+  def sonar(robot) do
+    with {:ok, [id]} <- Commands.robots([robot]),
+         do: ask(id, :sonar) || {:error, "#{id} does not answer"}
+  end
+
   @doc "Which robot hears which, as a table in `iex`."
   @spec matrix() :: Matrix.t()
   def matrix, do: Matrix.new(status())

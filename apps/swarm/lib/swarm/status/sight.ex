@@ -30,8 +30,17 @@ defmodule Swarm.Status.Sight do
          do: Map.take(ptz, [:pan, :tilt, :field_of_view])
   end
 
-  @doc "The landmark, by the same."
-  @spec of(Robot.Config.t(), %{term() => {term(), non_neg_integer()}}) :: t()
+  @doc "The landmark, by the same, for a robot of this config, or what of it is needed."
+  @spec of(
+          %{
+            required(:id) => atom(),
+            required(:profile) => Hal.Profile.t(),
+            required(:colours) => struct() | nil,
+            required(:mission) => {module(), keyword()} | nil,
+            optional(atom()) => term()
+          },
+          %{term() => {term(), non_neg_integer()}}
+        ) :: t()
   def of(config, entries) do
     with %{} = picture <- recent(entries, :detections),
          colour when colour != nil <- colour(config, entries) do
@@ -121,7 +130,8 @@ defmodule Swarm.Status.Sight do
       when is_binary(colour) and byte_size(colour) <= @longest and
              (bearing == nil or bearing in -@angle..@angle) and
              (distance == nil or distance in 0..@far) do
-    if String.printable?(colour),
+    # An escape is printable, and would reach a terminal.
+    if String.printable?(colour) and not (colour =~ ~r/[[:cntrl:]]/),
       do: %{
         colour: colour,
         bearing: bearing && bearing / 1000,
