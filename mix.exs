@@ -1,5 +1,11 @@
 Code.require_file("release.exs", __DIR__)
 
+# With LC_ALL=C Erlang takes an umlaut for two letters, and finds no file whose name has one. The scripts in bin set it.
+if :file.native_name_encoding() == :latin1 and Enum.any?(System.argv(), &(&1 =~ ~r/[^\x00-\x7F]/)) do
+  IO.puts(:stderr, "mix: the options hold letters that need UTF-8: export LC_ALL=C.UTF-8")
+  exit({:shutdown, 1})
+end
+
 defmodule Convoy.MixProject do
   use Mix.Project
 

@@ -51,6 +51,22 @@ defmodule ConsoleCommandTest do
     Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2", 600)
     told(console, ~r/heard: mag1, min1/)
 
+    # Of a robot elsewhere its sonars are shown, where its camera looks, and why there are no pictures.
+    Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
+    Browser.await(browser, "return window.floor.about?.sonar.length === 16")
+    Browser.await(browser, "return !document.getElementById('sonar').hidden")
+
+    Browser.await(
+      browser,
+      "return /looks at -?\\d+, -?\\d+ deg \\(zoom \\d+ deg\\), sees .*do not leave mag1@#{host}: look from there/s" <>
+        ".test(document.getElementById('about').innerText)"
+    )
+
+    assert Browser.run(browser, """
+           const camera = document.getElementById('camera');
+           return !camera.hidden && camera.disabled && camera.title.includes('look from there');
+           """)
+
     Browser.run(browser, "document.getElementById('estop').click()")
 
     Browser.await(

@@ -27,6 +27,62 @@ defmodule System.NodesLeaderTest do
   end
 end
 
+defmodule System.NodesPageTest do
+  @moduledoc "`bin/demo --nodes` and its page: what it cannot serve of robots in other processes is not offered, or says why."
+  use Nodes.Case, async: true
+  alias Console.Browser
+  @moduletag :realtime
+  @moduletag skip: Browser.why_not()
+
+  test "the chosen robot's panel is that of its process; its sonars are shown, and why its camera is not",
+       %{environment: env} do
+    port = start("--robots 2 --duration 120 --page 0", env, "")
+    said = await(port, ~r"http://\S+\n")
+    [url] = Regex.run(~r"http://\S+", said)
+    said = await(port, ~r/elected +\w+ leads/, said)
+    browser = Browser.open({1280, 800})
+    Browser.go(browser, url)
+    Browser.await(browser, "return window.floor.scene?.robots.length === 2")
+    Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
+    Browser.await(browser, "return window.floor.about?.sonar.length === 16")
+
+    Browser.await(
+      browser,
+      "return /wishes\\w+ \\d/.test(document.getElementById('about').textContent)"
+    )
+
+    # Direct blobs have no pictures; else it is the node that has them.
+    shown =
+      "return [...document.querySelectorAll('#acts button')].filter((b) => b.offsetParent && !b.disabled).map((b) => b.textContent)"
+
+    assert Browser.run(browser, shown) == ["Start", "Stop", "Kill", "Drive by keys", "Sonars"]
+
+    assert Browser.run(browser, "return document.getElementById('camera').title") =~
+             "do not leave mag1@"
+
+    # All that is offered is served.
+    for {button, answer} <- [
+          {"[data-one=stop]", "stop mag1: accepted"},
+          {"[data-one=start]", "start mag1: accepted"},
+          {"[data-one=kill]", "kill mag1: done"}
+        ] do
+      Browser.run(browser, "document.querySelector('#acts #{button}').click()")
+
+      Browser.await(
+        browser,
+        "return document.getElementById('answer').textContent === '#{answer}'"
+      )
+    end
+
+    Browser.await(browser, "return document.getElementById('acts').className === 'gone'")
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+    assert said =~ "mag1"
+    Port.command(port, "quit\n")
+    {_said, _status} = ending(port, "")
+  end
+end
+
 defmodule System.NodesWorldTest do
   @moduledoc "`bin/demo --nodes` from outside: the process of its world is killed."
   use Nodes.Case, async: true

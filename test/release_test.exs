@@ -194,6 +194,24 @@ defmodule System.ReleaseTest do
     assert said =~ ~r/robots\/mag1.exs: well/
   end
 
+  test "files may have umlauts in their names, whatever the locale", %{folder: folder} do
+    folder = Path.join(folder, "Flügel")
+    File.mkdir_p!(folder)
+    file = Path.join(folder, "übung.exs")
+    robot_file(file, "/dev/ttyS1")
+    {:ok, _secret} = Mesh.Secret.create(Path.join(folder, "secret"), false)
+
+    environment = [
+      {"ROBOT", "mag1"},
+      {"LC_ALL", "C"},
+      {"CONVOY_ROBOT_FILE", file},
+      {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}
+    ]
+
+    assert {said, 0} = robot(["check"], environment)
+    assert said =~ "#{file}: well"
+  end
+
   test "what is wrong is said in a line, and nothing starts", %{folder: folder} do
     file = Path.join(folder, "mag1.exs")
     robot_file(file, "/dev/ttyS1", ", arm: :maual")

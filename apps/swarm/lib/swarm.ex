@@ -28,7 +28,7 @@ defmodule Swarm do
   is sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Commands, Formation, Replacement, Status}
+  alias Swarm.{Behaviours, Commands, Formation, Replacement, Status}
   alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Membership.Matrix
@@ -102,6 +102,18 @@ defmodule Swarm do
   defp begin(mission, options) do
     with {:ok, robots, request} <- Commands.start(mission, options),
          do: Commands.tell(robots, request)
+  end
+
+  @doc """
+  Runs a behaviour that the build has named (`Swarm.Behaviours`) on a robot, a list of them, or `:all`, with its options.
+  Each leaves the group's mission for it, until its next start.
+
+      Swarm.run(:mag1, :corners, side: 2.0)
+  """
+  @spec run(robot() | [robot()] | :all, behaviour :: atom() | String.t(), keyword()) :: answer()
+  def run(to, behaviour, options \\ []) do
+    with {:ok, {module, options}} <- Behaviours.choose(behaviour, options),
+         do: command(to, {:run, module, options})
   end
 
   @doc """
@@ -199,6 +211,18 @@ defmodule Swarm do
   """
   @spec status(robot()) :: Status.t() | {:error, String.t()}
   def status(robot), do: StatusReport.one(robot)
+
+  @doc """
+  What a robot's sonars measured last, wherever it is: for each where it is on the body (its pose there), and how far the
+  nearest thing is in metres. The error says why it is not known.
+
+      Swarm.sonar(:mag1)
+  """
+  @spec sonar(robot()) :: {:ok, [{Hal.Pose.t(), float()}]} | {:error, line :: String.t()}
+  def sonar(robot) do
+    with {:ok, [id]} <- Commands.robots([robot]),
+         do: ask(id, :sonar) || {:error, "#{id} does not answer"}
+  end
 
   @doc "Which robot hears which, as a table in `iex`."
   @spec matrix() :: Matrix.t()

@@ -11,9 +11,9 @@ defmodule Console.Prompt do
   alias Console.Prompt.Stop
   alias Hal.Options.Suggest
   alias Robot.Command
-  alias Swarm.Missions
+  alias Swarm.{Behaviours, Missions}
 
-  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start replace arm disarm acknowledge pause resume step speed status nodes page tell help quit)
+  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -147,6 +147,8 @@ defmodule Console.Prompt do
       [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
       ["start"] -> Missions.names() ++ names
       ["start", name] -> if name in names, do: Missions.names(), else: []
+      ["run"] -> names
+      ["run", name] -> if name in names, do: Behaviours.names(), else: []
       ["replace"] -> Missions.names() ++ ["all" | names]
       ["replace", name] -> if name in ["all" | names], do: Missions.names(), else: []
       ["gamepad"] -> ["off" | names]
@@ -182,6 +184,7 @@ defmodule Console.Prompt do
         "replace flock                 they stand, change the mission, and go on;",
         "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
+        "run mag2 NAME                 one robot runs a behaviour of your own",
         "estop, or F8; reset           emergency stop of all, until the reset",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
       ] ++
@@ -270,6 +273,14 @@ defmodule Console.Prompt do
       else: mission_of("all", [mission | rest], robots)
   end
 
+  defp command("run", [name, behaviour], robots) do
+    with {:ok, _run} <- Missions.Text.request({:run, behaviour}, nil),
+         do: tell(name, ["run", behaviour], robots)
+  end
+
+  defp command("run", _rest, _robots),
+    do: {:error, "run needs a name and a behaviour: run mag1 #{behaviour()}"}
+
   defp command("replace", [mission], robots), do: replace("all", mission, robots)
   defp command("replace", [who, mission], robots), do: replace(who, mission, robots)
 
@@ -338,6 +349,8 @@ defmodule Console.Prompt do
     with {:ok, _mission} <- Missions.Text.read(mission, length(robots)),
          do: tell(who, ["replace", mission], robots)
   end
+
+  defp behaviour, do: List.first(Behaviours.names()) || "BEHAVIOUR"
 
   defp or_robot(word, robots), do: Suggest.hint(word, Enum.map(robots, &to_string/1))
 

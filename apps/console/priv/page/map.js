@@ -29,6 +29,8 @@ export class FloorView {
     // A drag whose end is not told gives no order.
     for (const name of ["pointercancel", "lostpointercapture"]) canvas.addEventListener(name, () => this.abandon());
     addEventListener("blur", () => this.abandon());
+    // A second finger may be beside the map.
+    addEventListener("pointerdown", (e) => this.dragged && this.dragged.id !== e.pointerId && this.abandon(), true);
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
     for (const name of ["focus", "blur"]) canvas.addEventListener(name, () => this.draw());
@@ -357,7 +359,6 @@ export class FloorView {
 
   // Only one pointer, and its main button, gives orders: a right click opens a menu, two fingers are no click.
   down(e) {
-    if (this.dragged && this.dragged.id !== e.pointerId) return this.abandon();
     if (!this.fit() || e.button !== 0 || !e.isPrimary) return;
     const { landmark, robot } = this.at(e);
     this.canvas.setPointerCapture(e.pointerId);
@@ -367,7 +368,7 @@ export class FloorView {
 
   move(e) {
     const d = this.dragged;
-    if (!d) return;
+    if (d?.id !== e.pointerId) return;
     if (e.buttons === 0) return this.abandon();
     const [dx, dy] = [e.clientX - d.from[0], e.clientY - d.from[1]];
     if (Math.hypot(dx, dy) > 4) d.moved = true;
@@ -384,8 +385,8 @@ export class FloorView {
 
   up(e) {
     const d = this.dragged;
+    if (d?.id !== e.pointerId) return;
     this.dragged = null;
-    if (!d) return;
     if (d.landmark && d.moved) this.on.landmark(...this.toFloor(e));
     else if (d.robot) this.on.choose(d.robot.id);
     else if (!d.moved && !d.landmark) this.on.send(...this.toFloor(e));

@@ -230,6 +230,8 @@ function about(told) {
     ["wishes", told.wishes.map(([by, weight]) => `${words(by)} ${weight.toFixed(2)}`).join(", ")],
     ["way", told.way.length > 0 && `${length([told.pose, ...told.way]).toFixed(1)} m, by ${told.way.length} ${told.way.length === 1 ? "place" : "places"}`],
     ["speed", told.speed === null ? "unknown" : `${decimals(told.speed)} m/s` + (told.turn === null ? "" : `, ${decimals(told.turn)} rad/s`)],
+    ["camera", [told.looks, told.sees].filter(Boolean).join(", ")],
+    ["pictures", told.pictures],
     ["limited by", told.limits.map(words).join(", ")],
     ["fault", told.fault],
     ["note", told.notes.join("; ")],
@@ -240,7 +242,9 @@ function about(told) {
   const made = (tag, textContent) => Object.assign(document.createElement(tag), { textContent });
   by("about").replaceChildren(...rows.flatMap(([term, text]) => [made("dt", term), made("dd", text)]));
   list("events", told.events);
-  by("camera").hidden = !told.camera;
+  by("camera").hidden = !told.camera && !told.pictures;
+  by("camera").disabled = !told.camera;
+  by("camera").title = told.pictures ? `pictures ${told.pictures}` : "";
   by("sonar").hidden = told.sonar.length === 0;
   floor.draw();
 }

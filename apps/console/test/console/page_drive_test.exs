@@ -220,6 +220,52 @@ defmodule Console.PageDriveTest do
     Live.Fleet.stop(live)
   end
 
+  test "a tap with two fingers gives no order, in whatever order they come and go; one with a finger does",
+       %{browser: browser, id: id, live: live} do
+    Browser.run(browser, """
+    window.said = [];
+    const send = WebSocket.prototype.send;
+    WebSocket.prototype.send = function (line) { window.said.push(line); return send.call(this, line); };
+    """)
+
+    said = fn -> Browser.run(browser, "return window.said") end
+    [left, right] = [{1, 200, 300}, {2, 260, 320}]
+    # Beside the map, where nothing is to be pressed.
+    [x, y] =
+      Browser.run(browser, """
+      const box = document.getElementById('leads').getBoundingClientRect();
+      return [box.left + 5, box.top + 5];
+      """)
+
+    for {first, second, last} <- [
+          {left, right, right},
+          {left, right, left},
+          {right, left, left},
+          {left, {2, x, y}, left},
+          {left, {2, x, y}, {2, x, y}},
+          {{1, x, y}, {2, 260, 320}, {2, 260, 320}}
+        ] do
+      Browser.touch(browser, "touchStart", [first])
+      Browser.touch(browser, "touchStart", [first, second])
+      Browser.touch(browser, "touchEnd", [last])
+      Browser.touch(browser, "touchEnd", [])
+      assert said.() == [], inspect({first, second, last})
+    end
+
+    Browser.touch(browser, "touchStart", [left, right])
+    Browser.touch(browser, "touchEnd", [])
+    assert said.() == []
+
+    Browser.touch(browser, "touchStart", [left])
+    Browser.touch(browser, "touchEnd", [])
+    Swarm.Case.eventually(fn -> said.() != [] end)
+    assert [line] = said.()
+    assert line =~ "goto #{id}"
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+    Live.Fleet.stop(live)
+  end
+
   defp pause, do: receive(do: (:never -> true), after: (50 -> false))
 
   defp dismissed?(browser) do

@@ -223,6 +223,11 @@ defmodule Console.PageTest do
 
         Browser.await(
           browser,
+          "return /cameralooks at -?\\d+, -?\\d+ deg \\(zoom \\d+ deg\\), sees /.test(document.getElementById('about').textContent)"
+        )
+
+        Browser.await(
+          browser,
           "return /\\d s  agree.*\\d s  follow/.test(document.getElementById('events').textContent)"
         )
 

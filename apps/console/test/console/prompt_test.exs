@@ -45,6 +45,7 @@ defmodule Console.PromptTest do
     assert ok("replace all flock") == {:tell, :all, "replace:flock"}
     assert ok("replace mag2 patrol:period=90") == {:tell, [:mag2], "replace:patrol:period=90"}
     assert ok("mag2 replace:flock") == {:tell, [:mag2], "replace:flock"}
+    assert ok("mag2 run:drift") == {:tell, [:mag2], "run:drift"}
     assert ok("mag2 wander") == {:tell, [:mag2], "wander"}
     assert ok("all square:2") == {:tell, :all, "square:2.0"}
     assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
@@ -189,6 +190,17 @@ defmodule Console.PromptTest do
     assert {{:line, line}, after_it} = Editor.key(typed, "\r")
     assert error(line) =~ "at most 500 bytes"
     assert after_it.most == Prompt.most_bytes()
+  end
+
+  test "behaviours of a build are run by their names" do
+    Application.put_env(:swarm, :behaviours, drift: Robot.Behaviour.Wander)
+    on_exit(fn -> Application.delete_env(:swarm, :behaviours) end)
+    assert ok("run mag2 drift") == {:tell, [:mag2], "run:drift"}
+    assert ok("run all drift") == {:tell, :all, "run:drift"}
+    assert error("run mag2 dirft") =~ "expected drift; did you mean drift?"
+    assert error("run drift") == "run needs a name and a behaviour: run mag1 drift"
+    assert error("start drift") =~ "drift is a behaviour: run:drift"
+    assert "drift" in Prompt.completions(["run", "mag2"], @robots)
   end
 
   test "names of missions are completed, and the help has them" do

@@ -121,6 +121,13 @@ defmodule Console.Browser do
   def mouse(browser, type, event),
     do: tools(browser, "Input.dispatchMouseEvent", event |> Map.new() |> Map.put(:type, type))
 
+  @doc "What fingers do: `touchStart`, `touchMove` or `touchEnd`, with the fingers that are down then, as `{id, x, y}`."
+  @spec touch(%__MODULE__{}, String.t(), [{integer(), number(), number()}]) :: term()
+  def touch(browser, type, fingers) do
+    points = for {id, x, y} <- fingers, do: %{id: id, x: x, y: y}
+    tools(browser, "Input.dispatchTouchEvent", %{type: type, touchPoints: points})
+  end
+
   @doc "Lets nothing load whose address is like one of these (`*/page.js`)."
   @spec block(%__MODULE__{}, [String.t()]) :: term()
   def block(browser, addresses) do

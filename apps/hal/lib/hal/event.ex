@@ -50,7 +50,8 @@ defmodule Hal.Event do
   | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`, judged by its datagrams |
   | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`, by Erlang's distribution |
   | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: a node has the secret, but is not in the roster |
-  | `[:mesh, :duplicate_node]` | `at_ms` | `node`: another node uses this node's name |
+  | `[:mesh, :duplicate_node]` | `at_ms` | `node`, `address`: another node uses this node's name, from that address; told once for each address, and every five minutes |
+  | `[:mesh, :unique_node]` | `at_ms` | `node`: the other one has not been heard for 10 s |
   | `[:mesh, :no_network]` | `at_ms` | `line`: nobody was heard for 3 s, and this is why (`Mesh.fault/0`); once for each reason |
   | `[:mesh, :network]` | `at_ms` | that is over |
   | `[:mesh, :libcluster]` | `at_ms` | `reason`: libcluster ended, and is restarted |

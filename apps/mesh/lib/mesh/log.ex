@@ -16,6 +16,7 @@ defmodule Mesh.Log do
     :unknown_node,
     :foreign,
     :duplicate_node,
+    :unique_node,
     :libcluster
   ]
 
@@ -68,6 +69,12 @@ defmodule Mesh.Log do
   def line(:libcluster, %{reason: reason}),
     do: {:warning, "mesh: libcluster ended, and starts again: #{inspect(reason, limit: 10)}"}
 
-  def line(:duplicate_node, %{node: node}),
-    do: {:error, "mesh: another node calls itself #{node}; rename one of the two"}
+  def line(:duplicate_node, %{node: node, address: ip}) do
+    {:error,
+     "mesh: another node, at #{:inet.ntoa(ip)}, calls itself #{node}, too; others hear one of the two only; " <>
+       "rename one"}
+  end
+
+  def line(:unique_node, %{node: node}),
+    do: {:warning, "mesh: no other node calls itself #{node} any more"}
 end

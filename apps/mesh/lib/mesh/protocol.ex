@@ -13,7 +13,7 @@ defmodule Mesh.Protocol do
   | `{:learn, name, ip, port}` | where a node's distribution listens |
   | `{:event, name, metadata}` | for whoever logs |
   """
-  alias Mesh.Protocol.{Admission, NodeTable, Outbox, Packet, Rejections, Roster}
+  alias Mesh.Protocol.{Admission, Namesake, NodeTable, Outbox, Packet, Rejections, Roster}
   alias Mesh.Protocol.Packet.ReplayProtection
 
   # Without a heartbeat of a robot of its own a node shows as often by beacons that it is there.
@@ -29,6 +29,7 @@ defmodule Mesh.Protocol do
                 late: [],
                 links: [],
                 spoke_ms: nil,
+                namesake: %Namesake{},
                 challenged: %{},
                 second: 0,
                 strange: 0,
@@ -68,6 +69,7 @@ defmodule Mesh.Protocol do
           sequence: non_neg_integer(),
           links: [String.t()],
           spoke_ms: integer() | nil,
+          namesake: Namesake.t(),
           challenged: %{{asked? :: boolean(), String.t(), address()} => integer()},
           second: integer(),
           strange: non_neg_integer(),
@@ -120,7 +122,11 @@ defmodule Mesh.Protocol do
     protocol = %{protocol | node_table: node_table, strategies: strategies}
     {protocol, sent} = Outbox.beacon(protocol, now_ms, due ++ targets)
     {protocol, challenges} = renew(Admission.tick(protocol, now_ms), now_ms)
-    {protocol, sent ++ challenges ++ Roster.changes(protocol.roster, changes)}
+    {alone?, namesake} = Namesake.tick(protocol.namesake, now_ms)
+    told = if alone?, do: [{:event, :unique_node, %{node: protocol.roster.me}}], else: []
+
+    {%{protocol | namesake: namesake},
+     sent ++ challenges ++ Roster.changes(protocol.roster, changes) ++ told}
   end
 
   # The clocks of others drift.

@@ -184,11 +184,25 @@ defmodule Mesh.ProtocolTest do
     impostor = %{impostor | roster: first.roster}
     air = put_in(air.stations["twin"], impostor) |> Map.put(:out, []) |> Air.run(3_000)
 
-    # b goes on with the first; both of the name learn of each other.
+    # b goes on with the first; both of the name learn of each other, once.
     assert changes(air, "b") == []
-    assert Enum.any?(air.out, &match?({_, "a", {:event, :duplicate_node, _}}, &1))
-    assert Enum.any?(air.out, &match?({_, "twin", {:event, :duplicate_node, _}}, &1))
+    assert [%{address: {10, 0, 0, 99}, node: :a@lab}] = told(air, "a", :duplicate_node)
+    assert [_once] = told(air, "twin", :duplicate_node)
+
+    air = Air.run(%{air | out: []}, 290_000)
+    assert told(air, "a", :duplicate_node) == []
+    air = Air.run(air, 10_000)
+    assert [_again] = told(air, "a", :duplicate_node)
+
+    # When it is gone this is told, once, and others hear the one that is left.
+    air = %{air | out: []} |> Air.leave("a") |> Air.run(30_000)
+    assert [%{node: :a@lab}] = told(air, "twin", :unique_node)
+    assert told(air, "twin", :duplicate_node) == []
+    assert hears(air, "b") == ["a"]
   end
+
+  defp told(air, station, event),
+    do: for({_at, ^station, {:event, ^event, about}} <- air.out, do: about)
 
   # Ten in a row are lost once in some two hundred such minutes: of this one it is known.
   test "loss of a third of all datagrams makes nobody suspect for long" do

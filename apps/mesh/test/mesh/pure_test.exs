@@ -16,6 +16,7 @@ defmodule Mesh.PureTest do
   doctest Mesh.Protocol.Packet.ReplayProtection
   doctest Mesh.Protocol.Packet.SequenceWindow
   doctest Mesh.Log
+  doctest Mesh.Protocol.Namesake
   doctest Mesh.Protocol.NodeTable
   doctest Mesh.Protocol.Packet
   doctest Mesh.Distribution.Topology

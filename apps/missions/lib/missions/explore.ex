@@ -8,8 +8,11 @@ defmodule Missions.Explore do
   the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
 
-  Its phases are `:explore`, and `:explored` while no frontier is left that it can reach; then it claims `formed`, unless too
-  much of the edge of what it has seen is no wall: it has no room to get there, and says so. A place to which it came no nearer is left alone for a while, and for ever the second time. Options: `Missions.Explore.Options`.
+  Its phases are `:explore`, and `:explored` while no frontier is left that it can reach; then it claims `formed`, unless
+  too much of the edge of what it has seen is no wall: it has no room to get there, and says so. Before, it goes to the
+  walls of few echoes that close its ways (`Robot.Navigation.Survey.doubt/3`), and looks at them from nearby; where these
+  were many, it says so and claims nothing. A place to which it came no nearer is left alone for a while, and for ever the
+  second time. Options: `Missions.Explore.Options`.
   """
   alias Hal.Pose
   alias Missions.Explore.{Options, SharedMap}
@@ -33,6 +36,12 @@ defmodule Missions.Explore do
   @most_aside 64
   @ever_ms 86_400_000
   @tolerance 0.2
+  # So near to a wall that it doubts it has looked at it (metres).
+  @near 0.5
+  # So many such looks, and one for each so many square metres, are usual: in the built-in maps it was 5 at most, in lanes 1.5 m
+  # wide 1; in lanes of 1 m, which echoes from their sides close, 8 on 24 m2 and more.
+  @few 3
+  @per_look 10
   # The share of the edge of what was seen that may be unknown when all is explored. In the built-in maps it was 5 % at most,
   # 10 % where poses had drifted and walls had gaps; in lanes too narrow for the robot 25 to 45 %.
   @unknown 0.15
@@ -51,6 +60,8 @@ defmodule Missions.Explore do
                 goal: 0,
                 still: nil,
                 aside: [],
+                looked: [],
+                doubts?: false,
                 done?: false,
                 unknown: 1.0,
                 told?: false,
@@ -61,9 +72,11 @@ defmodule Missions.Explore do
   @typedoc """
   `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
   `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
-  when; `unknown` is the share of
-  the edge of what was seen along which nothing is known (`Robot.Navigation.Frontiers.unknown/1`), 1.0 while there are
-  frontiers; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they go, and how far that is.
+  when; `unknown` is the share of the edge of what was seen along which nothing is known
+  (`Robot.Navigation.Frontiers.unknown/1`), 1.0 while there are frontiers; `looked` are places where it has looked at a wall
+  of few echoes, to one of which it goes if `doubts?`; `looked` are walls of few echoes at which it has looked, `doubts?`
+  that it goes to one; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they
+  go, and how far that is.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -79,6 +92,8 @@ defmodule Missions.Explore do
           goal: non_neg_integer(),
           still: {Pose.point(), integer()} | nil,
           aside: [{Pose.point(), until_ms :: integer()}],
+          looked: [Pose.point()],
+          doubts?: boolean(),
           done?: boolean(),
           unknown: float(),
           told?: boolean(),
@@ -176,12 +191,17 @@ defmodule Missions.Explore do
 
   defp give_up(%{target: nil} = mission), do: mission
 
+  defp give_up(%{doubts?: true, target: %{at: at}} = mission),
+    do: choose_anew(%{mission | looked: [at | mission.looked]})
+
   defp give_up(%{target: %{at: at}} = mission) do
     again? = Enum.any?(mission.aside, fn {place, _until} -> Pose.distance(place, at) < @aside end)
     until_ms = mission.now_ms + if(again?, do: @ever_ms, else: @aside_ms)
-    aside = Enum.take([{at, until_ms} | mission.aside], @most_aside)
-    %{mission | aside: aside, target: nil, ahead: nil, planned_ms: nil, still: nil}
+    choose_anew(%{mission | aside: Enum.take([{at, until_ms} | mission.aside], @most_aside)})
   end
+
+  defp choose_anew(mission),
+    do: %{mission | target: nil, ahead: nil, planned_ms: nil, still: nil}
 
   defp plan(%{planned_ms: planned_ms, now_ms: now_ms} = mission, _percept)
        when planned_ms != nil and now_ms - planned_ms < @plan_ms,
@@ -190,14 +210,17 @@ defmodule Missions.Explore do
   defp plan(%{now_ms: now_ms} = mission, percept) do
     from = Pose.point(percept.pose)
     peers = for {id, {at_ms, goal}} <- mission.peers, now_ms - at_ms < @silent_ms, do: {id, goal}
-    field = mission.map |> SharedMap.raster() |> Frontiers.find(from, percept.profile.radius)
+    mission = looked(mission, from)
+    find = &Frontiers.find(&1, from, percept.profile.radius)
+    field = mission.map |> SharedMap.raster() |> find.()
     {open, unknown} = open(mission, field)
+    {field, open, doubts?} = doubt(mission, find, field, open)
     goals = for {_id, goal} <- Enum.sort(peers), goal != nil, do: goal
     target = Choice.of(open, mission.me, mission.target && mission.target.at, goals)
     done? = field != nil and open == [] and now_ms - mission.since_ms >= @first_ms
     first? = Enum.all?(peers, fn {id, _goal} -> mission.me < id end)
 
-    mission = %{mission | unknown: unknown}
+    mission = %{mission | unknown: unknown, doubts?: doubts?}
 
     stages =
       if done? and not mission.told? and first?,
@@ -234,6 +257,33 @@ defmodule Missions.Explore do
     end
   end
 
+  # Before all is explored, it looks at what closes a way by few echoes.
+  defp doubt(%{looked: looked} = mission, find, %{} = field, [])
+       when length(looked) < @most_aside do
+    look? = &(open?(mission, &1) and not seen?(looked, &1))
+
+    with %{} = doubted <- mission.map |> SharedMap.doubted() |> find.(),
+         [_ | _] = open <- look(doubted, look?) do
+      {doubted, open, true}
+    else
+      _nothing -> {field, [], false}
+    end
+  end
+
+  defp doubt(_mission, _find, field, open), do: {field, open, false}
+
+  defp look(field, look?) do
+    with [] <- Enum.filter(field.found, look?),
+         do: field |> Frontiers.narrow() |> Enum.filter(look?)
+  end
+
+  defp seen?(looked, %{at: at}), do: Enum.any?(looked, &(Pose.distance(&1, at) < @aside))
+
+  defp looked(%{doubts?: doubts?, target: target} = mission, from) do
+    near? = doubts? and target != nil and Pose.distance(from, target.at) < @near
+    if near?, do: %{mission | looked: [target.at | mission.looked]}, else: mission
+  end
+
   defp within?(%{home: {hx, hy}, within: within}, {x, y}),
     do: abs(x - hx) <= within and abs(y - hy) <= within
 
@@ -259,7 +309,7 @@ defmodule Missions.Explore do
     %{
       phase: phase(mission),
       standing: mission.target == nil,
-      formed: mission.done? and mission.unknown <= @unknown,
+      formed: mission.done? and mission.unknown <= @unknown and not closed?(mission),
       says: says(mission)
     }
   end
@@ -273,18 +323,27 @@ defmodule Missions.Explore do
     do: "#{area(mission)} explored, going to a frontier #{Float.round(far, 1)} m away"
 
   # What it did not get to may be behind a door, or in a place without room for it.
-  defp left(%{aside: aside, now_ms: now_ms, unknown: unknown}) do
+  defp left(%{aside: aside, now_ms: now_ms, unknown: unknown} = mission) do
     frontiers =
       case Enum.count(aside, fn {_place, until_ms} -> until_ms > now_ms end) do
         0 -> "no frontier is left"
         count -> "no frontier is left but #{count} that it did not reach"
       end
 
-    if unknown > @unknown,
-      do:
-        "#{frontiers}; it has no room to get to the #{round(unknown * 100)} % of its edge that are unknown",
-      else: frontiers
+    cond do
+      unknown > @unknown ->
+        "#{frontiers}; it has no room to get to the #{round(unknown * 100)} % of its edge that are unknown"
+
+      closed?(mission) ->
+        "#{frontiers}; echoes closed #{length(mission.looked)} ways, too many to be sure that all of them are walls"
+
+      true ->
+        frontiers
+    end
   end
+
+  defp closed?(%{looked: looked, map: map}),
+    do: length(looked) > @few + SharedMap.area(map) / @per_look
 
   defp area(mission), do: "#{round(SharedMap.area(mission.map))} m²"
 end

@@ -1,7 +1,29 @@
+defmodule Swarm.CommandsTest.Tacks do
+  @moduledoc "Goes at a speed, as a behaviour of one's own."
+  @behaviour Robot.Behaviour
+  alias Hal.{Options, Twist}
+
+  @impl Robot.Behaviour
+  def option_table do
+    legs = [{:list, {:integer, 0, 9, "m"}, 9}, default: []]
+    [speed: [{:number, 0, 1, "m/s"}, default: 0.1], legs: legs]
+  end
+
+  @impl Robot.Behaviour
+  def new(options), do: {__MODULE__, Options.check!(options, option_table(), "tacks")}
+
+  @impl Robot.Behaviour
+  def tick(_percept, options) do
+    wish = Robot.Wish.new(:tacks, %{Twist.zero() | linear: options[:speed]}, 0.5)
+    {:running, wish, {__MODULE__, options}}
+  end
+end
+
 defmodule Swarm.CommandsTest do
   use Swarm.Case, async: false
   @moduletag :realtime
   @moduletag :capture_log
+  alias Swarm.CommandsTest.Tacks
 
   defp line({:error, line}) do
     assert is_binary(line)
@@ -165,6 +187,45 @@ defmodule Swarm.CommandsTest do
              "square: expected a side from 0.2 to 10.0 m, got 50.0"
 
     assert line(Swarm.tell(id, "wandr")) =~ "did you mean wander?"
+  end
+
+  test "a behaviour of one's own is run by its name, and by nothing else" do
+    Application.put_env(:swarm, :behaviours, tacks: Tacks, drift: Robot.Behaviour.Wander)
+    on_exit(fn -> Application.delete_env(:swarm, :behaviours) end)
+    id = robot(:command_runs)
+    standing([id])
+
+    assert order(fn -> Swarm.tell(id, "run:tacks:legs=[1,2]") end) == :ok
+    assert state(id) == {Robot.Mission.Manual, :run}
+    eventually(fn -> doing(id) == :tacks end)
+    assert order(fn -> Swarm.run(:all, :drift) end) == :ok
+    eventually(fn -> doing(id) == :wander end)
+    assert order(fn -> Swarm.run(id, "tacks", speed: 0.2) end) == :ok
+    eventually(fn -> doing(id) == :tacks end)
+
+    known = "expected tacks or drift"
+
+    assert line(Swarm.run(id, :tcaks)) ==
+             "behaviour :tcaks is not known; #{known}; did you mean tacks?"
+
+    assert line(Swarm.tell(id, "run:tcaks")) =~ known
+    assert line(Swarm.tell(id, "run:tacks:sped=1")) =~ "option sped is not known"
+
+    assert line(Swarm.run(id, :tacks, speed: 9)) =~
+             "speed: expected a number from 0 to 1 m/s, got 9"
+
+    assert line(Swarm.run(id, :tacks, 5)) =~ "expected options [key: value, …], got 5"
+    assert line(Swarm.tell(id, "run:drift:speed=1")) == "drift takes no options as text"
+    assert line(Swarm.start(:tacks)) =~ "tacks is a behaviour: run:tacks"
+
+    # What comes past the public interface: no module without a name, and no wrong options.
+    assert line(Swarm.ask(id, {:run, Robot.Behaviour.Goto, [x: 1, y: 1]})) =~
+             "behaviour Robot.Behaviour.Goto is not known"
+
+    assert line(Swarm.ask(id, {:run, Tacks, [speed: :fast]})) =~ "got :fast"
+    assert line(Swarm.ask(id, {:run, Tacks, 5})) =~ "expected a command"
+    Application.put_env(:swarm, :behaviours, [])
+    assert line(Swarm.run(id, :tacks)) =~ "none has a name (config :swarm, behaviours: …)"
   end
 
   test "a formation is :ok only when all on the mission have it; a robot that does not answer is named" do

@@ -31,7 +31,10 @@ defmodule Robot.Behaviour do
   """
   @callback routed(route(), Percept.t(), state :: term()) :: t()
 
-  @optional_callbacks update: 2, routed: 3
+  @doc "The options as a table of `Hal.Options`: with it people may write them as text, `run:corners:side=2`."
+  @callback option_table() :: Hal.Options.table()
+
+  @optional_callbacks update: 2, routed: 3, option_table: 0
 
   @doc """
   Checks a goal, `{module, options}` or `nil` for none: whether the module is a behaviour that

@@ -14,6 +14,7 @@ defmodule Robot.Command do
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
+  | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.Behaviours`) |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
   | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.Missions.Text`) |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
@@ -29,6 +30,8 @@ defmodule Robot.Command do
           | :lead
           | :start
           | {:start, mission :: String.t()}
+          | {:run, behaviour :: String.t()}
+          | {:run, module(), options :: keyword()}
           | :wander
           | :rest
           | {:square, side :: float() | nil}
@@ -63,6 +66,7 @@ defmodule Robot.Command do
     {"wander", [], []},
     {"rest", [], []},
     {"square", [], [:side]},
+    {"run", [:behaviour], [:options]},
     {"start", [], [:mission, :options]},
     {"ping", [], []},
     {"arm", [], []},
@@ -116,8 +120,8 @@ defmodule Robot.Command do
 
   defp command([word | arguments], known) do
     keyword = word |> String.trim() |> String.downcase()
-    # The options of a mission may hold colons, too.
-    arguments = if keyword == "start", do: joined(arguments), else: arguments
+    # Options in words may hold colons, too.
+    arguments = if keyword in ["start", "run"], do: joined(arguments), else: arguments
 
     case List.keyfind(@grammar, keyword, 0) do
       nil ->
@@ -173,6 +177,7 @@ defmodule Robot.Command do
   defp build("lead", []), do: :lead
   defp build("start", []), do: :start
   defp build("start", words), do: {:start, Enum.join(words, ":")}
+  defp build("run", words), do: {:run, Enum.join(words, ":")}
   defp build("wander", []), do: :wander
   defp build("rest", []), do: :rest
   defp build("square", []), do: {:square, nil}
@@ -217,6 +222,7 @@ defmodule Robot.Command do
   @spec to_text(t()) :: String.t()
   def to_text(word) when word in @bare, do: Atom.to_string(word)
   def to_text({:start, mission}), do: join("start", [mission])
+  def to_text({:run, behaviour}), do: join("run", [behaviour])
   def to_text({:square, nil}), do: "square"
   def to_text({:square, side}), do: join("square", [side])
   def to_text({:move, v, w}), do: join("move", [v, w])

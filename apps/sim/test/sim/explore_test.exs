@@ -36,6 +36,45 @@ defmodule Sim.ExploreTest do
     assert Trial.result(trial).collisions == 0
   end
 
+  # Lanes one behind the other, each open at one end, in 12 x 10 m: a cell is 0.1 m.
+  defp lanes(path, metres) do
+    {width, height, lane} = {120, 100, round(metres * 10)}
+    count = div(height - 1, lane + 1)
+
+    rows =
+      for y <- 0..(height - 1) do
+        {n, within} = {div(y, lane + 1), rem(y, lane + 1)}
+        open? = fn x -> if rem(n, 2) == 1, do: x >= width - 1 - lane, else: x <= lane end
+
+        for x <- 0..(width - 1), into: "" do
+          free? = n < count and (within > 0 or (n > 0 and open?.(x)))
+          if(x in 1..(width - 2) and free?, do: "1 ", else: "0 ")
+        end
+      end
+
+    File.write!(path, "P2\n#{width} #{height}\n1\n" <> Enum.join(rows, "\n") <> "\n")
+    path <> ":12x10"
+  end
+
+  @tag :slow
+  @tag :tmp_dir
+  test "walls of few echoes that close a lane are looked at, and it does not say that all is explored where it is not",
+       %{tmp_dir: folder} do
+    shares =
+      for {metres, seed} <- [{1.2, 1}, {1.2, 3}, {1.0, 2}, {1.0, 4}] do
+        map = lanes(Path.join(folder, "lanes#{metres}.pgm"), metres)
+        begun = trial(robots: [:mag1], seed: seed, map: map, duration_s: 600)
+        start = Hal.Pose.point(begun.world.robots[:mag1].pose)
+        trial = run(begun)
+        %{share: share} = Trial.Coverage.of(trial, [start])
+        assert share > 0.95 or not Trial.formed?(trial), inspect({metres, seed, share})
+        assert Trial.result(trial).collisions == 0
+        share
+      end
+
+    assert Enum.sum(shares) / length(shares) > 0.5
+  end
+
   test "what holds for every mission holds" do
     assert Robot.MissionCase.problems(:explore, seeds: 1..2, seconds: 60) == []
   end

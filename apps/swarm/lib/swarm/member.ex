@@ -34,7 +34,8 @@ defmodule Swarm.Member do
                         :follow,
                         :follow_the_leader,
                         :find_blob,
-                        :square
+                        :square,
+                        :run
                       ])
 
   @enforce_keys [:id, :profile, :boot, :mission, :runner, :executive, :gate, :receiver]

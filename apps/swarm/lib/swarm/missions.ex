@@ -13,6 +13,7 @@ defmodule Swarm.Missions do
   alias Hal.Options.{Suggest, Type, Wording}
   alias Robot.File.Terms
   alias Robot.Mission
+  alias Swarm.Behaviours
 
   @typedoc "How people name a mission: by its name, also as text, or by its module; with options or without."
   @type named ::
@@ -41,7 +42,13 @@ defmodule Swarm.Missions do
     shown = Wording.show(name)
     # In the notation of the one who asks.
     names = if is_binary(name), do: names(), else: Keyword.keys(known)
-    {:error, "mission #{shown} is not known; #{allowed(names)}#{Suggest.hint(shown, names)}"}
+    {:error, "mission #{shown} is not known; #{allowed(names)}#{hint(name, shown, names)}"}
+  end
+
+  defp hint(name, shown, names) do
+    if to_string(name) in Behaviours.names(),
+      do: "; #{name} is a behaviour: run:#{name}",
+      else: Suggest.hint(shown, names)
   end
 
   @doc "The names of all missions, in their order."

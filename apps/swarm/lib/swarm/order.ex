@@ -92,6 +92,7 @@ defmodule Swarm.Order do
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
   defp known?({:start, options}), do: Keyword.keyword?(options)
   defp known?({:start, module, options}), do: is_atom(module) and Keyword.keyword?(options)
+  defp known?({:run, module, options}), do: is_atom(module) and Keyword.keyword?(options)
   defp known?(_other), do: false
 
   defp brief(term), do: inspect(term, limit: 5, printable_limit: 40)

@@ -44,6 +44,9 @@ defmodule Swarm.Status do
   (`Swarm.Membership.Peers`). The line names the robots that it knows only by way of others as not
   heard. `Swarm.matrix/0` shows the same for all robots as a table.
 
+  After the age stands where its camera looks (`head`), and what that shows of the landmark (`sees`; `Swarm.Status.Sight`), of
+  robots that have a pan-tilt unit and a camera: `looks at 12, 0 deg (zoom 49 deg), sees YellowLandmark at -12 deg, 2.31 m`.
+
   A robot whose machine has no network says `NO NETWORK`, and why (`network`; `Mesh.fault/0`).
 
   The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
@@ -56,7 +59,7 @@ defmodule Swarm.Status do
   alias Swarm.EStop
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
-  alias Swarm.Status.Frame
+  alias Swarm.Status.{Frame, Sight}
 
   @recently_ms 60_000
 
@@ -95,6 +98,8 @@ defmodule Swarm.Status do
                 view: nil,
                 rejected: %{},
                 network: nil,
+                head: nil,
+                sees: nil,
                 age_ms: nil
               ]
 
@@ -133,6 +138,8 @@ defmodule Swarm.Status do
           view: view() | nil,
           rejected: %{atom() => pos_integer()},
           network: String.t() | nil,
+          head: Sight.head(),
+          sees: Sight.t(),
           age_ms: non_neg_integer() | nil
         }
 
@@ -187,6 +194,8 @@ defmodule Swarm.Status do
       view: {Peers.view_number(receiver.peers, now_ms), Peers.view(receiver.peers, now_ms)},
       rejected: receiver.rejected,
       network: Mesh.fault(),
+      head: Sight.head(entries),
+      sees: Sight.of(config, entries),
       age_ms: age(entries)
     }
   end
@@ -293,7 +302,9 @@ defmodule Swarm.Status do
         "hears #{length(status.hears)}" <> deaf(status),
         status.network && "NO NETWORK (#{status.network})",
         dropped > 0 && "dropped #{dropped} messages",
-        "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: "")
+        "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: ""),
+        Swarm.Status.Sight.words(status.head),
+        Swarm.Status.Sight.words(status.sees)
       ]
       |> Enum.filter(& &1)
       |> Kernel.++(offline)

@@ -4,6 +4,7 @@ defmodule Swarm.StatusTest do
   alias Swarm.Status.Frame
 
   doctest Frame
+  doctest Swarm.Status.Sight
 
   test "the line shows the view's number, and names robots that it does not hear" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
@@ -41,6 +42,88 @@ defmodule Swarm.StatusTest do
     unknown = %{status | speed: nil}
     assert inspect(unknown) =~ "speed unknown"
     assert {:ok, %{speed: nil}} = Status.Row.decode(id, Status.Row.encode(unknown), 10)
+  end
+
+  test "status and row say where the camera looks, and what it shows of the landmark" do
+    classes =
+      for name <- ["Lamp", "Red"], do: %{name: name, y: {80, 240}, u: {60, 90}, v: {130, 145}}
+
+    {:ok, colours} = Vision.Colours.new(classes)
+    camera = {Hal.FakeCamera, test: self(), device: :camera}
+
+    id =
+      robot(:status_sight,
+        camera: camera,
+        colours: colours,
+        ptz: {Hal.FakePtz, test: self(), device: :ptz}
+      )
+
+    assert %{head: nil, sees: nil} = Swarm.status(id)
+
+    board = Board.find!(id)
+    look = %{pan: 0.21, tilt: -0.1, field_of_view: 0.85}
+
+    lamp = %Vision.Blob{
+      colour: "Lamp",
+      area: 90,
+      share: 0.01,
+      x: 159.5,
+      y: 9.0,
+      left: 150,
+      top: 1,
+      right: 169,
+      bottom: 17,
+      width: 320,
+      height: 240,
+      distance: 2.314
+    }
+
+    show = fn blobs ->
+      now_ms = System.monotonic_time(:millisecond)
+      Board.put(board, :ptz, :ptz, look, now_ms)
+      picture = %Vision.Detections{at_ms: now_ms, blobs: blobs, pan: 0.3, field_of_view: 0.85}
+      Board.put(board, :blob_detector, :detections, picture, now_ms)
+      Swarm.status(id)
+    end
+
+    status = show.([%{lamp | colour: "Red", area: 900}, lamp])
+    assert %{head: ^look, sees: %{colour: "Lamp", bearing: 0.3, distance: 2.314}} = status
+    assert inspect(status) =~ ", looks at 12, -6 deg (zoom 49 deg), sees Lamp at 17 deg, 2.31 m"
+    assert {:ok, told} = Status.Row.decode(id, Status.Row.encode(status), 10)
+    assert {told.head, told.sees} == {look, status.sees}
+
+    status = show.([])
+    assert status.sees == %{colour: "Lamp", bearing: nil, distance: nil}
+    assert inspect(status) =~ ", sees no Lamp"
+    row = Status.Row.encode(status)
+    assert {:ok, %{sees: %{bearing: nil}}} = Status.Row.decode(id, row, 10)
+
+    for junk <- [
+          7,
+          {1, 2, -3},
+          {"x", 1.5, 2},
+          {String.duplicate("x", 81), 1, 2},
+          {"\e[2J", 1, 2},
+          {:pan, 1, 2},
+          {0, 0, -1}
+        ],
+        do:
+          assert(
+            {:ok, %{head: nil, sees: nil}} =
+              Status.Row.decode(id, %{row | head: junk, sees: junk}, 10)
+          )
+  end
+
+  test "what sonars measure is asked for, and only what is of now" do
+    id = robot(:status_sonar)
+    send(Names.whereis(id, :drive), {:readings, [{:sonar, for(n <- 1..16, do: n / 10)}]})
+    eventually(fn -> match?({:ok, [{%Pose{}, 0.1} | _]}, Swarm.sonar(id)) end)
+    assert {:ok, [_ | _] = ranges} = Swarm.sonar(id)
+    assert length(ranges) == 16
+    Board.put(Board.find!(id), :drive, :sonar, [1.0], System.monotonic_time(:millisecond) - 5_000)
+    assert Swarm.sonar(id) == {:error, "status_sonar: its sonars say nothing"}
+    assert {:error, line} = Swarm.sonar(:status_snoar)
+    assert line =~ "status_snoar"
   end
 
   test "a robot's row says what blocks it, as text of limited length" do

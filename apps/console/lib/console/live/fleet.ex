@@ -42,7 +42,16 @@ defmodule Console.Live.Fleet do
   def status(live, robot), do: live |> scene() |> Format.one(robot)
 
   @impl Console.Live
-  def about(_live, robot), do: About.of(robot)
+  def about(live, robot), do: About.of(robot) || elsewhere(robot, Fleet.living(live))
+
+  # A process of its own has its board there.
+  defp elsewhere(robot, living) do
+    with true <- robot in living, %Swarm.Status{} = status <- Swarm.status(robot) do
+      About.of_status(status)
+    else
+      _dead_or_unknown -> nil
+    end
+  end
 
   @impl Console.Live
   def command(live, command) do

@@ -7,7 +7,7 @@ defmodule Console.Page.About do
   alias Robot.Control.Controller
   alias Sim.Trial.Setup
   alias Swarm.{Member, Status}
-  alias Vision.View
+  alias Swarm.Status.Sight
 
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
@@ -38,8 +38,12 @@ defmodule Console.Page.About do
         sonar: sonar(robot, recent(entries, :sonar)),
         seen: seen(recent(entries, :detections)),
         camera: Names.whereis(robot, :view) != nil,
+        pictures: nil,
         notes: []
       }
+      |> Map.merge(
+        sight(robot, entries, (recent(entries, :release, :infinity) || %{mission: nil}).mission)
+      )
       |> Map.merge(wheels(recent(entries, :odometry)))
     else
       :error -> nil
@@ -65,18 +69,22 @@ defmodule Console.Page.About do
         sonar: sonar(member.id, percept.sonar),
         seen: nil,
         camera: false,
+        pictures: nil,
         notes: []
       }
+      |> Map.merge(sight(member.id, now(percept), member.mission))
       |> Map.merge(wheels(percept.odometry))
     end
   end
 
   @doc """
-  The same of a robot anywhere, from its status, which does not know what sonars and cameras see. `notes` are what its
-  status remarks, as in `iex`.
+  The same of a robot anywhere, from its status, and its sonars, which it is asked for; the pictures of its camera do not leave
+  its node, and `pictures` says so. `notes` are what its status remarks, as in `iex`.
   """
   @spec of_status(Status.t()) :: t()
   def of_status(%Status{} = status) do
+    here? = Names.whereis(status.robot, :view) != nil
+
     %{
       by: status.by,
       wishes: wishes(status.weights),
@@ -89,11 +97,41 @@ defmodule Console.Page.About do
       power: status.power,
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
-      sonar: [],
+      sonar: asked(status),
       seen: nil,
-      camera: Names.whereis(status.robot, :view) != nil,
+      camera: here?,
+      pictures:
+        if(not here? and is_map_key(status.health, :camera),
+          do: "do not leave #{status.node}: look from there"
+        ),
+      looks: Sight.words(status.head),
+      sees: Sight.words(status.sees),
       notes: notes(status)
     }
+  end
+
+  # Only one that answers is asked, within half a second.
+  defp asked(%{from: :robot, robot: robot}) do
+    with {:ok, ranges} <- Swarm.sonar(robot),
+         do: for({at, range} <- ranges, do: [at.x, at.y, at.heading, range]),
+         else: (_not_known -> [])
+  end
+
+  defp asked(_row), do: []
+
+  # What it perceived last, as entries of a board.
+  defp now(percept), do: %{ptz: {percept.ptz, 0}, detections: {percept.detections, 0}}
+
+  defp sight(robot, entries, mission) do
+    config = %{
+      id: robot,
+      profile: Setup.profile(robot),
+      colours: Sim.World.colours(),
+      mission: mission
+    }
+
+    head = entries |> Sight.head() |> Sight.words()
+    %{looks: head, sees: config |> Sight.of(entries) |> Sight.words()}
   end
 
   defp wishes(weights), do: for({by, weight} <- weights, do: [by, weight])
@@ -119,12 +157,7 @@ defmodule Console.Page.About do
 
   @doc "A new picture of its camera as JPEG, or why there is none."
   @spec picture(atom()) :: {:ok, binary()} | {:error, line :: String.t()}
-  def picture(robot) do
-    case Names.whereis(robot, :view) do
-      nil -> {:error, "#{robot} has no camera on this node"}
-      view -> with {:ok, picture} <- View.snapshot(view), do: {:ok, picture.jpeg}
-    end
-  end
+  def picture(robot), do: Swarm.Camera.snapshot(robot)
 
   # What they report, not what they are told.
   defp wheels(%Odometry{twist: twist}), do: %{speed: twist.linear, turn: twist.turn}

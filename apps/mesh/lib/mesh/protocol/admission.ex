@@ -8,7 +8,7 @@ defmodule Mesh.Protocol.Admission do
   (`Mesh.Protocol.Challenge`). Terms of the services that the consumer accepts late, such as a
   stop, are taken in both cases, if the session was once accepted.
   """
-  alias Mesh.Protocol.{Beacon, NodeTable, Outbox, Packet, Rejections, Roster}
+  alias Mesh.Protocol.{Beacon, Namesake, NodeTable, Outbox, Packet, Rejections, Roster}
   alias Mesh.Protocol.Packet.ReplayProtection
 
   # A challenge to an address of a node, no more often than this, once because it is heard and once
@@ -91,14 +91,9 @@ defmodule Mesh.Protocol.Admission do
 
   defp take(protocol, packet, node, %Beacon{} = beacon, {ip, _port}, now_ms) do
     learn = if beacon.port > 0, do: [{:learn, packet.sender, ip, beacon.port}], else: []
-
-    rival =
-      if node == protocol.roster.me, do: [{:event, :duplicate_node, %{node: node}}], else: []
-
-    {%{
-       protocol
-       | node_table: NodeTable.beacon(protocol.node_table, packet.sender, beacon, now_ms)
-     }, learn ++ rival}
+    node_table = NodeTable.beacon(protocol.node_table, packet.sender, beacon, now_ms)
+    {protocol, told} = namesake(%{protocol | node_table: node_table}, node, ip, now_ms)
+    {protocol, learn ++ told}
   end
 
   # A heartbeat that is meant for some only is passed on: its robot is elsewhere.
@@ -127,6 +122,14 @@ defmodule Mesh.Protocol.Admission do
 
   defp take(protocol, _packet, node, {to, message, _about}, _address, _now_ms),
     do: {protocol, [{:deliver, to, node, message}]}
+
+  defp namesake(%{roster: %{me: me}} = protocol, me, ip, now_ms) do
+    {tell?, namesake} = Namesake.hear(protocol.namesake, ip, now_ms)
+    told = if tell?, do: [{:event, :duplicate_node, %{node: me, address: ip}}], else: []
+    {%{protocol | namesake: namesake}, told}
+  end
+
+  defp namesake(protocol, _other, _ip, _now_ms), do: {protocol, []}
 
   # Who cannot be believed yet may challenge this node, too, and then gets both in one.
   defp challenge(protocol, packet, body, address, now_ms) do

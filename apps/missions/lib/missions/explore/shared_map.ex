@@ -136,6 +136,15 @@ defmodule Missions.Explore.SharedMap do
     if map.tiles[at] == states, do: %{map | news: List.delete(map.news, at)}, else: map
   end
 
+  @doc "The same with the robot's own walls as unknown of which it has heard little (`Robot.Navigation.Survey.doubt/3`)."
+  @spec doubted(t()) :: Writer.raster()
+  def doubted(%__MODULE__{tiles: tiles, survey: survey} = map),
+    do:
+      raster(%{
+        map
+        | tiles: Map.new(tiles, fn {at, states} -> {at, Survey.doubt(survey, at, states)} end)
+      })
+
   @doc "All that is known, as one rectangle."
   @spec raster(t()) :: Writer.raster()
   def raster(%__MODULE__{tiles: tiles}) when tiles == %{},

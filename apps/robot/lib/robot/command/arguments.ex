@@ -28,6 +28,8 @@ defmodule Robot.Command.Arguments do
   def value(:colour, text, _known), do: {:ok, text}
   def value(:mission, "", _known), do: {:error, "a mission's name"}
   def value(:mission, text, _known), do: {:ok, text}
+  def value(:behaviour, "", _known), do: {:error, "a behaviour's name"}
+  def value(:behaviour, text, _known), do: {:ok, text}
   def value(:options, text, _known), do: {:ok, text}
   def value(:found, "0", _known), do: {:ok, false}
   def value(:found, "1", _known), do: {:ok, true}

@@ -17,8 +17,8 @@ defmodule Robot.File.Odd do
   @beyond_m 0.005
 
   @doc """
-  All warnings, one line each; `there?` reports whether a device exists on this machine, and `kind` what it is (the type of
-  `File.Stat`).
+  All warnings, one line each; `there?` reports whether a device exists on this machine, and `kind` what it is: the type of
+  `File.Stat`, `:no_hardware` for a serial port without, `:console` for one that the system itself writes to.
 
       iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
       ...>   drive: {Some.Drive, [port: "/dev/ttyS9"]}, limits: [max_turn_acceleration: 0.017]}
@@ -32,6 +32,8 @@ defmodule Robot.File.Odd do
       []
       iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "/tmp"]}}, fn _ -> true end, fn _ -> :directory end)
       ["/tmp is a directory here; a serial line is a device"]
+      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "ttyS0"]}}, fn _ -> true end, fn _ -> :no_hardware end)
+      ["ttyS0 has no hardware behind it here; a USB adapter is /dev/ttyUSB0 or /dev/ttyACM0"]
   """
   @spec lines(Robot.File.t(), (Path.t() -> boolean()), (Path.t() -> atom())) :: [String.t()]
   def lines(%Robot.File{} = robot, there?, kind \\ fn _path -> :device end) do
@@ -157,10 +159,21 @@ defmodule Robot.File.Odd do
         port = options[:port],
         is_binary(port),
         path = Enum.find([port, Path.expand(port, "/dev")], there?),
-        kind.(path) not in [:device, :other],
+        why = unfit(kind.(path)),
         uniq: true,
-        do: "#{port} is a #{kind.(path)} here; a serial line is a device"
+        do: "#{port} #{why}"
   end
+
+  defp unfit(:no_hardware),
+    do: "has no hardware behind it here; a USB adapter is /dev/ttyUSB0 or /dev/ttyACM0"
+
+  defp unfit(:console),
+    do:
+      "is a console of this machine, and the system's words would reach the device; see /proc/cmdline"
+
+  defp unfit(:directory), do: "is a directory here; a serial line is a device"
+  defp unfit(:regular), do: "is a plain file here; a serial line is a device"
+  defp unfit(_device_or_other), do: nil
 
   defp devices(robot, there?) do
     named =

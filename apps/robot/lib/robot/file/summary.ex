@@ -41,10 +41,20 @@ defmodule Robot.File.Summary do
     [title | lines(robot)] ++ Enum.flat_map(odd, &row({:WARNING, &1}))
   end
 
+  # Linux knows of a serial port whether there is hardware, which it has asked, and whether it writes its own words there.
   defp kind(path) do
     case File.stat(path) do
+      {:ok, %File.Stat{type: :device}} -> tty(Path.join("/sys/class/tty", Path.basename(path)))
       {:ok, %File.Stat{type: type}} -> type
       {:error, _unknown} -> :device
+    end
+  end
+
+  defp tty(folder) do
+    case {File.read(folder <> "/type"), File.read(folder <> "/console")} do
+      {{:ok, "0\n"}, _console} -> :no_hardware
+      {_type, {:ok, "Y\n"}} -> :console
+      _any_other -> :device
     end
   end
 

@@ -156,6 +156,7 @@ defmodule Robot.Mission.Manual do
     do: {Robot.Behaviour.Goto, x: x, y: y, heading: heading}
 
   defp goal({:follow, %Pose{} = place}, _percept), do: {Robot.Behaviour.Follow, target: place}
+  defp goal({:run, module, options}, _percept), do: {module, options}
   defp goal(:wander, _percept), do: {Robot.Behaviour.Wander, []}
   defp goal(:rest, _percept), do: {Robot.Behaviour.Rest, []}
   defp goal({:square, nil}, _percept), do: {Robot.Behaviour.Square, []}

@@ -22,6 +22,8 @@ defmodule Robot.Navigation.Survey do
   # Evidence from which on a cell is surely wall, and surely free: three echoes, two looks.
   @wall 30
   @free -8
+  # Evidence below which a wall is doubted: the most there is, of six echoes.
+  @sure 60
   @fresh <<0::size(@tile * @tile)-unit(8)>>
   # How far (metres) another robot may be from where it tells, if one of the two is unsure of its place.
   @unsure 1.0
@@ -143,6 +145,28 @@ defmodule Robot.Navigation.Survey do
   @spec states(t(), tile()) :: states()
   def states(%__MODULE__{tiles: tiles}, at),
     do: for(<<evidence::signed <- Map.get(tiles, at, @fresh)>>, into: <<>>, do: state(evidence))
+
+  @doc """
+  The states of a tile (of `states/2`, or told by others), with the walls as unknown for which there are few echoes. Those from
+  the sides of a passage may come from anywhere in the cones of the sonars that slant to it, and close it.
+
+      iex> survey = %Robot.Navigation.Survey{tiles: %{{0, 0} => <<-8::signed, 30, 60, 0::2024>>}}
+      iex> states = <<1, 2, 2, 2, 0::2016>>
+      iex> <<a, b, c, d, _::binary>> = Robot.Navigation.Survey.doubt(survey, {0, 0}, states)
+      iex> {a, b, c, d}
+      {1, 0, 2, 2}
+  """
+  @spec doubt(t(), tile(), states()) :: states()
+  def doubt(%__MODULE__{tiles: tiles}, at, states),
+    do: doubted(Map.get(tiles, at, @fresh), states, <<>>)
+
+  defp doubted(<<e::signed, a::binary>>, <<2, b::binary>>, done) when e >= @wall and e < @sure,
+    do: doubted(a, b, <<done::binary, 0>>)
+
+  defp doubted(<<_, a::binary>>, <<s, b::binary>>, done),
+    do: doubted(a, b, <<done::binary, s>>)
+
+  defp doubted(<<>>, <<>>, done), do: done
 
   defp state(evidence) when evidence >= @wall, do: <<2>>
   defp state(evidence) when evidence <= @free, do: <<1>>

@@ -47,6 +47,7 @@ defmodule Sim.Scenario.Expectation do
     :follow,
     :follow_the_leader,
     :find_blob,
+    :run,
     :done,
     :given_up,
     :found,

@@ -28,7 +28,7 @@ defmodule Sim.Trial.Event do
   @type entry :: {at_s :: number(), t()}
 
   # What a robot carries out itself; the others are for the wheels' person, or are never accepted.
-  @alone ~w(move goto followtheleader findblob follow lead wander rest square start)
+  @alone ~w(move goto followtheleader findblob follow lead wander rest square run start)
   @longest_s 1_000_000
 
   @doc "The type of a script, in a table of `Hal.Options`."
@@ -44,7 +44,7 @@ defmodule Sim.Trial.Event do
       {:ok, {20.0, {:freeze, :mag1, 3.0}}}
       iex> Sim.Trial.Event.read({20, {:tell, :mag1, "goot:1:2"}})
       {:error, [{["command"], "expected :start, :stop, {:formation, kind, spacing} or a text " <>
-        "with one of move, goto, followtheleader, findblob, follow, lead, wander, rest, square, start, got \\"goot:1:2\\"; did you mean goto?"}]}
+        "with one of move, goto, followtheleader, findblob, follow, lead, wander, rest, square, run, start, got \\"goot:1:2\\"; did you mean goto?"}]}
   """
   @spec read(term()) :: Type.result() | false
   def read({at_s, event}) do
@@ -109,7 +109,7 @@ defmodule Sim.Trial.Event do
     word = text |> String.split(":") |> hd() |> String.trim() |> String.downcase()
 
     cond do
-      word == "start" -> start(text)
+      word in ["start", "run"] -> named(text)
       word not in @alone -> refuse(text, Suggest.hint(word, @alone))
       # Which names there are is known later.
       word == "followtheleader" -> true
@@ -119,7 +119,7 @@ defmodule Sim.Trial.Event do
 
   defp command(other), do: refuse(other, "")
 
-  defp start(text) do
+  defp named(text) do
     with {:ok, command} <- Command.parse(text, []),
          {:ok, _request} <- Swarm.Missions.Text.request(command, nil),
          do: true

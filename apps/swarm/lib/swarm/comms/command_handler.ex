@@ -11,6 +11,7 @@ defmodule Swarm.Comms.CommandHandler do
   |---|---|
   | `:status` | `Swarm.Status` |
   | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
+  | `:sonar` | `{:ok, [{where, metres}]}`: what its sonars measured last, or why that is not known |
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
   | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.Missions`) |
   | `{:formation, kind, spacing}` | for the running mission |
@@ -29,7 +30,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Mission.Manual
   alias Robot.Navigation.{Grid, Reach}
   alias Mesh.Nonblocking
-  alias Swarm.{Missions, Replacement, Status}
+  alias Swarm.{Behaviours, Missions, Replacement, Status}
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
@@ -37,6 +38,8 @@ defmodule Swarm.Comms.CommandHandler do
 
   # The caller waits for half a second (`Swarm.Commands.Client`); after that nothing may begin.
   @carry_out_ms 400
+  # Readings that are older tell nothing of now.
+  @recent_ms 1_000
   # The drive may begin at the last moment, and takes some time.
   @drive_ms 50
 
@@ -60,6 +63,13 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp judge(:ping, config, board, receiver),
     do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
+
+  defp judge(:sonar, config, board, _receiver) do
+    case Board.fetch(board, :sonar, @recent_ms) do
+      {:ok, ranges, _age_ms} -> {:ok, Enum.zip(config.profile.sonars, ranges)}
+      _old_or_none -> {:error, "#{config.id}: its sonars say nothing"}
+    end
+  end
 
   defp judge(:acknowledge, _config, _board, _receiver), do: {:drive, :acknowledge}
 
@@ -141,6 +151,12 @@ defmodule Swarm.Comms.CommandHandler do
     with {:ok, _order} <- Order.check({:start, mission, options}),
          {:ok, {module, options}} <- Missions.choose({mission, options}, nil),
          do: {:ok, {:start, module, options}}
+  end
+
+  defp checked({:run, behaviour, options}, _config) do
+    with {:ok, _order} <- Order.check({:run, behaviour, options}),
+         {:ok, {module, options}} <- Behaviours.choose(behaviour, options),
+         do: {:ok, {:run, module, options}}
   end
 
   defp checked(request, _config), do: Order.check(request)

@@ -1,12 +1,12 @@
 defmodule Swarm.Missions.Text do
   @moduledoc """
-  Missions as people type them, `patrol` or `patrol:period=90,loop=square`: a name, and the options of its
+  Missions, and behaviours (`Swarm.Behaviours`), as people type them, `patrol` or `patrol:period=90,loop=square`: a name, and the options of its
   table (`c:Robot.Mission.option_table/0`). A value is a word (`square`, `on`), a number, `kind:number` (a formation's
   `wedge:1.2`), or Elixir's notation (`[{1,2},{3,4}]`). Pure; no text becomes an atom.
   """
   alias Hal.Options.Type
   alias Robot.File.{Reader, Terms}
-  alias Swarm.Missions
+  alias Swarm.{Behaviours, Missions}
 
   @doc """
   The module of a mission and its checked options; `robots` is how many start together, `nil` if that
@@ -18,19 +18,29 @@ defmodule Swarm.Missions.Text do
     {name, options} = split(text)
 
     with {:ok, module} <- Missions.fetch(name),
-         {:ok, options} <- options(module, options),
+         {:ok, options} <- options(Missions.name(module), Missions.option_table(module), options),
          {:ok, options} <- Missions.options(module, options, robots),
          do: {:ok, {module, options}}
   end
 
   @doc """
   The request of a text command (`Robot.Command`): a start that names its mission in words becomes
-  `{:start, module, options}`; any other stays as it is.
+  `{:start, module, options}`, a run of a behaviour `{:run, module, options}`; any other stays as it is.
   """
   @spec request(Robot.Command.t(), robots :: pos_integer() | nil) ::
           {:ok, term()} | {:error, line :: String.t()}
   def request({:start, text}, robots) do
     with {:ok, {module, options}} <- read(text, robots), do: {:ok, {:start, module, options}}
+  end
+
+  def request({:run, text}, _robots) do
+    {name, options} = split(text)
+
+    with {:ok, module} <- Behaviours.fetch(name),
+         table = Missions.option_table(module),
+         {:ok, options} <- options(Behaviours.name(module), table, options),
+         {:ok, {module, options}} <- Behaviours.choose(module, options),
+         do: {:ok, {:run, module, options}}
   end
 
   def request(command, _robots), do: {:ok, command}
@@ -42,20 +52,15 @@ defmodule Swarm.Missions.Text do
     end
   end
 
-  defp options(_module, ""), do: {:ok, []}
+  defp options(_name, _table, ""), do: {:ok, []}
+  defp options(name, nil, _text), do: {:error, "#{name} takes no options as text"}
 
-  defp options(module, text) do
-    case Missions.option_table(module) do
-      nil ->
-        {:error, "#{Missions.name(module)} takes no options as text"}
+  defp options(name, table, text) do
+    pairs = text |> parts() |> Enum.map(&pair(&1, table))
 
-      table ->
-        pairs = text |> parts() |> Enum.map(&pair(&1, table))
-
-        case Enum.find(pairs, &is_binary/1) || Enum.find_value(pairs, &joined(&1, table)) do
-          nil -> {:ok, pairs}
-          wrong -> {:error, "#{Missions.name(module)}: #{fault(wrong)}"}
-        end
+    case Enum.find(pairs, &is_binary/1) || Enum.find_value(pairs, &joined(&1, table)) do
+      nil -> {:ok, pairs}
+      wrong -> {:error, "#{name}: #{fault(wrong)}"}
     end
   end
 

@@ -66,7 +66,7 @@ defmodule Swarm.Order.Freshness do
   """
   @spec needed?(request :: term()) :: boolean()
   def needed?({:estop, _call}), do: false
-  def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping]
+  def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping, :sonar]
 
   @doc "Whether a term from outside can be a stamp."
   @spec stamp?(term()) :: boolean()

@@ -45,6 +45,8 @@ defmodule Swarm.Status.Row do
     |> uncertain(status.uncertainty)
     |> given(:frame, status.frame && Status.Frame.encode(status.frame))
     |> given(:epoch, status.epoch)
+    |> given(:head, Status.Sight.encode(status.head))
+    |> given(:sees, Status.Sight.encode(status.sees))
     |> given(:says, status.says && short(status.says))
   end
 
@@ -123,6 +125,8 @@ defmodule Swarm.Status.Row do
          uncertainty: uncertainty,
          frame: Status.Frame.decode(Map.get(row, :frame)),
          epoch: epoch,
+         head: Status.Sight.decode_head(Map.get(row, :head)),
+         sees: Status.Sight.decode(Map.get(row, :sees)),
          speed: speed && speed / 1000,
          limits: Enum.map(limits, &Blackboard.Codec.word/1),
          estop: estop,
