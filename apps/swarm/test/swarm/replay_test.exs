@@ -12,7 +12,7 @@ defmodule Swarm.ReplayTest do
     def init(_robot, _options), do: {:waits, nil, []}
 
     @impl Robot.Mission
-    def handle({:command, {:run, x, y}}, nil),
+    def handle({:command, {:errand, x, y}}, nil),
       do: {:goes, nil, [{:goal, :errand, {Robot.Behaviour.Goto, x: x, y: y}}]}
 
     def handle(_event, nil), do: {:goes, nil, []}
@@ -33,7 +33,7 @@ defmodule Swarm.ReplayTest do
   defp inputs do
     still = %Odometry{pose: Pose.new(0, 0), twist: Twist.zero()}
 
-    [{:command, :start, 0}, {:command, {:run, 2.0, 0.0}, 0}] ++
+    [{:command, :start, 0}, {:command, {:errand, 2.0, 0.0}, 0}] ++
       for at_ms <- 0..900//100,
           input <- [{:reading, {:odometry, still}, at_ms}, {:tick, at_ms}, {:reflex, at_ms}],
           do: input
@@ -84,7 +84,7 @@ defmodule Swarm.ReplayTest do
 
   test "an input that is missing shows in what the robot does afterwards" do
     steps = record(inputs())
-    without = List.keydelete(steps, {:command, {:run, 2.0, 0.0}, 0}, 0)
+    without = List.keydelete(steps, {:command, {:errand, 2.0, 0.0}, 0}, 0)
     assert [%{at_ms: 0, replayed: [{:drive, %{linear: linear}}]} | _] = replay(without)
     assert linear == 0.0
   end

@@ -103,7 +103,9 @@ defmodule Sim.Hardware.LineTest do
     eventually(fn -> still?(context) end)
     eventually(fn -> health(id) == {:offline, :silent} end)
     # A driver that is opening its line again answers with the reason.
-    eventually(fn -> match?(%{state: :disarmed}, Hal.Device.arming(Names.whereis(id, :drive))) end)
+    eventually(fn ->
+      match?(%{state: :disarmed}, Hal.Device.arming(Names.whereis(id, :drive)))
+    end)
 
     :ok = Emulator.change(emulator, :silence, [[]])
     eventually(fn -> health(id) == :online end)

@@ -17,8 +17,10 @@ defmodule Robot.Navigation.MapFile.DescriptionTest do
     do: String.replace(@yaml, ~r/^#{key}:.*$/m, line)
 
   test "what map_server writes is read, also with quotes, remarks, a list of lines and \\r\\n" do
-    assert {:ok, %{image: "floor.pgm", resolution: 0.05, origin: {-1.0, -3.0, 0.0}}} =
+    assert {:ok, %{image: "floor.pgm", resolution: 0.05, origin: {-1.0, -3.0, turn}}} =
              Description.parse(@yaml)
+
+    assert turn == 0.0
 
     for yaml <- [
           String.replace(@yaml, "\n", "\r\n"),
