@@ -157,9 +157,14 @@ defmodule Sim.Trial do
   @spec command(t(), atom() | :all, term()) :: t()
   def command(trial, to, command) do
     Enum.reduce(awake(trial), trial, fn id, trial ->
-      if to in [:all, id], do: input(trial, id, {:command, command, trial.at_ms}), else: trial
+      if to in [:all, id], do: input(trial, id, told(command, trial.at_ms)), else: trial
     end)
   end
+
+  # A fault of its program is no command of a person.
+  defp told({:crash, role}, at_ms), do: {:crash, role, at_ms}
+  defp told({:hang, role, until_ms}, at_ms), do: {:hang, role, until_ms, at_ms}
+  defp told(command, at_ms), do: {:command, command, at_ms}
 
   @doc "The robots that have not been killed, in the order of the fleet."
   @spec living(t()) :: [atom()]

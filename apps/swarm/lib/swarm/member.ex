@@ -12,10 +12,12 @@ defmodule Swarm.Member do
   | `{:command, command, at_ms}` | a person |
   | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
+  | `{:crash, role, at_ms}` | a fault: this role begins anew, and those behind it, as under their supervisor |
+  | `{:hang, role, until_ms, at_ms}` | a fault: what arrives at executive or pilot waits; after 2 s it is killed |
 
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
-  alias Hal.{Pose, Profile, Twist}
+  alias Hal.{Pose, Twist}
   alias Robot.Percept
   alias Robot.Control.{Controller, Delivery, Executive, Pilot}
   alias Robot.Mission.{Manual, Runner}
@@ -39,19 +41,23 @@ defmodule Swarm.Member do
                         :run
                       ])
 
-  @enforce_keys [:id, :profile, :boot, :mission, :pilot, :executive, :gate, :receiver]
-  defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
+  # The order in which the robot's supervisor starts them: with one that ends, those behind it end.
+  @roles [:gate, :executive, :pilot]
+  # When `Robot.Safety.LivenessMonitor` kills what hangs.
+  @killed_ms 2_000
+
+  @enforce_keys [:config, :boot, :pilot, :executive, :gate, :receiver]
+  defstruct @enforce_keys ++
+              [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil, hung: %{}]
 
   @typedoc """
-  `mission` is the mission that a start begins; `entries` holds the last
+  `config` is what it was started with, its mission that which a start begins; `entries` holds the last
   readings by name, with their times; `receiver` holds what was heard: peers, rejected messages;
   `stop` is the state of the emergency stop.
   """
   @type t :: %__MODULE__{
-          id: atom(),
-          profile: Profile.t(),
+          config: Robot.Config.t(),
           boot: non_neg_integer(),
-          mission: {module(), keyword()},
           pilot: Pilot.t(),
           executive: Executive.t(),
           gate: Gate.t(),
@@ -59,7 +65,8 @@ defmodule Swarm.Member do
           stop: EStop.State.t(),
           entries: %{atom() => {term(), integer()}},
           sequence: non_neg_integer(),
-          beat_ms: integer() | nil
+          beat_ms: integer() | nil,
+          hung: %{atom() => {until_ms :: integer(), killed_ms :: integer(), waiting :: [Robot.Role.input()]}}
         }
 
   @type input ::
@@ -69,6 +76,8 @@ defmodule Swarm.Member do
           | {:command, term(), integer()}
           | {:tick, integer()}
           | {:reflex, integer()}
+          | {:crash, :gate | :executive | :pilot, integer()}
+          | {:hang, :executive | :pilot, until_ms :: integer(), integer()}
 
   @type effect ::
           {:drive, Twist.t()}
@@ -88,7 +97,8 @@ defmodule Swarm.Member do
 
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
     given = Keyword.take(options, [:id, :profile, :start, :plan])
-    config = struct!(Robot.Config, given ++ [drive: {__MODULE__, []}, ptz: {__MODULE__, []}])
+    devices = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}]
+    config = struct!(Robot.Config, given ++ devices ++ [mission: options[:mission]])
     entries = %{arming: {%{state: :armed, why: nil}, 0}}
     {gate, _started} = Gate.init(config, entries, 0)
     {executive, _started} = Executive.init(config, entries, 0)
@@ -97,10 +107,8 @@ defmodule Swarm.Member do
     {runner, []} = Runner.start(runner, module, mission_options)
 
     %__MODULE__{
-      id: options[:id],
-      profile: options[:profile],
+      config: config,
       boot: options[:boot],
-      mission: options[:mission],
       pilot: %{pilot | runner: runner, state: Runner.state(runner), options: mission_options},
       executive: executive,
       gate: gate,
@@ -111,6 +119,19 @@ defmodule Swarm.Member do
 
   @doc "Handles one input, and returns the effects."
   @spec step(t(), input()) :: {t(), [effect()]}
+  def step(member, {:crash, role, at_ms}) when role in @roles, do: crash(member, role, at_ms)
+
+  def step(member, {:hang, role, until_ms, at_ms}) when role in [:executive, :pilot] do
+    {member, effects} = member |> recovered(at_ms)
+    {put_in(member.hung[role], {until_ms, at_ms + @killed_ms, []}), effects}
+  end
+
+  def step(%{hung: hung} = member, {:tick, at_ms}) when hung != %{} do
+    {member, recovered} = recovered(member, at_ms)
+    {member, effects} = tick(member, at_ms)
+    {member, recovered ++ effects}
+  end
+
   def step(member, {:reading, {key, value} = reading, at_ms}),
     do: member |> put(key, value, at_ms) |> gate({:cast, {:sense, reading}}, at_ms)
 
@@ -120,7 +141,7 @@ defmodule Swarm.Member do
   def step(member, {:message, term, at_ms}), do: hear(member, Message.check(term), at_ms)
 
   def step(member, {:command, :estop, at_ms}),
-    do: latch(member, EStop.State.press(member.stop, {member.id, 0, at_ms}), at_ms)
+    do: latch(member, EStop.State.press(member.stop, {member.config.id, 0, at_ms}), at_ms)
 
   def step(member, {:command, {:estop, call}, at_ms}),
     do: latch(member, EStop.State.call(member.stop, call), at_ms)
@@ -146,11 +167,7 @@ defmodule Swarm.Member do
     end
   end
 
-  def step(member, {:tick, at_ms}) do
-    {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
-    {member, beats} = beat(member, at_ms)
-    {member, effects ++ beats}
-  end
+  def step(member, {:tick, at_ms}), do: tick(member, at_ms)
 
   def step(member, {:reflex, at_ms}), do: gate(member, :tick, at_ms)
 
@@ -191,11 +208,65 @@ defmodule Swarm.Member do
   def stands?(member),
     do: Runner.state(member.pilot.runner) == :idle or member.executive.controller.tag == :stand
 
+  defp tick(member, at_ms) do
+    {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
+    {member, beats} = beat(member, at_ms)
+    {member, effects ++ beats}
+  end
+
+  # As under `Robot.Supervisor`: comms comes last, and begins a new life; the e-stop's state is on the board.
+  defp crash(member, role, at_ms) do
+    member = %{
+      member
+      | boot: member.boot + 1,
+        sequence: 0,
+        beat_ms: nil,
+        receiver: Receiver.new(member.config.id),
+        hung: Map.drop(member.hung, behind(role))
+    }
+
+    {effects, member} = Enum.flat_map_reduce(behind(role), member, &back(begin(&1, &2, at_ms)))
+    {member, effects}
+  end
+
+  defp behind(role), do: Enum.drop_while(@roles, &(&1 != role))
+
+  defp begin(role, member, at_ms) do
+    {state, effects} = module(role).init(member.config, member.entries, at_ms)
+    carry(effects, Map.put(member, role, state), at_ms)
+  end
+
+  defp module(:gate), do: Gate
+  defp module(:executive), do: Executive
+  defp module(:pilot), do: Pilot
+
+  # What has waited is handed on in its order; what has hung for too long was killed meanwhile.
+  defp recovered(member, at_ms) do
+    Enum.reduce(@roles, {member, []}, fn role, {member, done} ->
+      {member, effects} = recovered(member.hung[role], role, member, at_ms)
+      {member, done ++ effects}
+    end)
+  end
+
+  defp recovered({until_ms, _killed_ms, waiting}, role, member, at_ms) when at_ms >= until_ms do
+    member = %{member | hung: Map.delete(member.hung, role)}
+
+    {effects, member} =
+      waiting |> Enum.reverse() |> Enum.flat_map_reduce(member, &back(hand(role, &2, &1, at_ms)))
+
+    {member, effects}
+  end
+
+  defp recovered({_until_ms, killed_ms, _waiting}, role, member, at_ms) when at_ms >= killed_ms,
+    do: crash(member, role, at_ms)
+
+  defp recovered(_well_or_hanging, _role, member, _at_ms), do: {member, []}
+
   # What people order goes the ways that it goes live; what a mission's own programs order is for the one that runs.
   defp ways(command, member)
        when is_alone(command) or command == :start or
               (is_tuple(command) and elem(command, 0) in [:start, :formation]),
-       do: CommandHandler.ways(command, member)
+       do: CommandHandler.ways(command, member.config)
 
   defp ways(_other, _member), do: {:ok, [{:hand, {:except, Manual}}]}
 
@@ -207,19 +278,22 @@ defmodule Swarm.Member do
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
     do: latch(member, EStop.State.hear(member.stop, beat.estop), at_ms)
 
-  defp gate(member, input, at_ms) do
-    {gate, effects} = Gate.handle(input, at_ms, member.gate, member.entries)
-    carry(effects, %{member | gate: gate}, at_ms)
+  defp gate(member, input, at_ms), do: hand(:gate, member, input, at_ms)
+  defp executive(member, input, at_ms), do: hand(:executive, member, input, at_ms)
+  defp pilot(member, input, at_ms), do: hand(:pilot, member, input, at_ms)
+
+  defp hand(role, %{hung: hung} = member, input, _at_ms) when is_map_key(hung, role) do
+    {until_ms, killed_ms, waiting} = hung[role]
+    # A ticker asks for its next tick when the last one was handled, so one waits at most.
+    waiting = if match?({:tick, _}, input), do: Enum.reject(waiting, &match?({:tick, _}, &1)), else: waiting
+    {put_in(member.hung[role], {until_ms, killed_ms, [input | waiting]}), []}
   end
 
-  defp executive(member, input, at_ms) do
-    {executive, effects} = Executive.handle(input, at_ms, member.executive, member.entries)
-    carry(effects, %{member | executive: executive}, at_ms)
-  end
+  defp hand(role, member, input, at_ms) do
+    {state, effects} =
+      module(role).handle(input, at_ms, Map.fetch!(member, role), member.entries)
 
-  defp pilot(member, input, at_ms) do
-    {pilot, effects} = Pilot.handle(input, at_ms, member.pilot, member.entries)
-    carry(effects, %{member | pilot: pilot}, at_ms)
+    carry(effects, Map.put(member, role, state), at_ms)
   end
 
   # Carries out the effects of a role (`Robot.Role`): those that others notice are left.
@@ -249,9 +323,12 @@ defmodule Swarm.Member do
     do: back(pilot(member, {:cast, message}, at_ms))
 
   defp carry_one({:send, to, body}, member, _at_ms),
-    do: {[{:send, to, Message.of(member.id, body)}], member}
+    do: {[{:send, to, Message.of(member.config.id, body)}], member}
 
   defp carry_one({:stage, _name, _facts} = stage, member, _at_ms), do: {[stage], member}
+  defp carry_one({:put, key, value}, member, at_ms), do: {[], put(member, key, value, at_ms)}
+  defp carry_one({:latch, set?}, member, at_ms), do: {[], put(member, :latch, set?, at_ms)}
+  defp carry_one(:tick, member, at_ms), do: back(gate(member, :tick, at_ms))
   defp carry_one(_inside, member, _at_ms), do: {[], member}
 
   defp back({member, effects}), do: {effects, member}
@@ -266,9 +343,9 @@ defmodule Swarm.Member do
   def percept(member, at_ms) do
     Percept.Snapshot.build(
       %Percept{
-        robot: member.id,
+        robot: member.config.id,
         at_ms: at_ms,
-        profile: member.profile,
+        profile: member.config.profile,
         peers: Peers.percepts(member.receiver.peers, at_ms)
       },
       fn key, limit_ms ->
@@ -294,7 +371,13 @@ defmodule Swarm.Member do
 
   defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
 
-  defp halt(member, at_ms), do: pilot(member, {:cast, {:halt, nil}}, at_ms)
+  # To all at once, as `Robot.Control.Pilot.halt_at_once/2`: one that hangs does not delay the others.
+  defp halt(member, at_ms) do
+    {member, stopped} = gate(member, {:cast, {:forget, nil}}, at_ms)
+    {member, held} = executive(member, {:cast, :hold}, at_ms)
+    {member, ended} = pilot(member, {:cast, {:halt, nil}}, at_ms)
+    {member, stopped ++ held ++ ended}
+  end
 
   defp beat(member, at_ms) do
     with true <- Heartbeat.due?(member.beat_ms, at_ms),
@@ -310,7 +393,7 @@ defmodule Swarm.Member do
       beat = Heartbeat.new(sender, percept, claim, heard, member.stop)
 
       {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
-       [{:send, :all, Message.new(member.id, :heartbeat, beat)}]}
+       [{:send, :all, Message.new(member.config.id, :heartbeat, beat)}]}
     else
       _not_due_or_lost -> {member, []}
     end

@@ -31,7 +31,7 @@ defmodule Swarm.Replay do
       {member, replayed} ->
         {member,
          %{
-           robot: member.id,
+           robot: member.config.id,
            at_ms: at_ms(input),
            input: input,
            recorded: recorded,

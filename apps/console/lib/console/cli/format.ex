@@ -46,6 +46,10 @@ defmodule Console.Cli.Format do
   # A mission's own words.
   def meaning(%{says: says, robot: robot}), do: "#{robot} #{says}"
   def meaning(%{stage: :crashed, robot: robot, crash: crash}), do: "#{robot}: #{crash}"
+
+  def meaning(%{stage: :hangs, robot: robot, role: role, for_s: for_s}),
+    do: "#{robot}: its #{role}, for #{for_s} s"
+
   def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
 

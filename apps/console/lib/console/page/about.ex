@@ -66,13 +66,13 @@ defmodule Console.Page.About do
         power: percept.power,
         offline: [],
         estop: member.stop.held != [],
-        sonar: sonar(member.id, percept.sonar),
+        sonar: sonar(member.config.id, percept.sonar),
         seen: nil,
         camera: false,
         pictures: nil,
         notes: []
       }
-      |> Map.merge(sight(member.id, now(percept), member.mission))
+      |> Map.merge(sight(member.config.id, now(percept), member.config.mission))
       |> Map.merge(wheels(percept.odometry))
     end
   end

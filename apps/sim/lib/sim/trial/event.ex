@@ -14,6 +14,8 @@ defmodule Sim.Trial.Event do
   | `{:join}` | all that the script has cut is whole again |
   | `{:loss, share}` | this share of the messages is lost from now on |
   | `{:freeze, robot, for_s}` | its processes get no processor: it hears, senses, thinks and sends nothing, its wheels stop 200 ms later |
+  | `{:crash, robot, role}` | this part of its program crashes: `:gate`, `:executive` or `:pilot`; it and those behind it begin anew, idle |
+  | `{:hang, robot, role, for_s}` | this part, `:executive` or `:pilot`, handles nothing; after 2 s it is killed, as by a crash |
   | `{:displace, robot, {x, y, heading_deg}}` | it is lifted to another place; its wheels do not count that |
   | `{:blind, robot, for_s}` | its camera gives no pictures |
   | `{:deaf, robot, for_s}` | it receives no messages |
@@ -87,6 +89,8 @@ defmodule Sim.Trial.Event do
       {:join, [], []},
       {:loss, [share: {:number, 0, 1}], []},
       {:freeze, [robot: who, for_s: for_s], []},
+      {:crash, [robot: who, role: {:one_of, [:gate, :executive, :pilot]}], []},
+      {:hang, [robot: who, role: {:one_of, [:executive, :pilot]}, for_s: for_s], []},
       {:displace, [robot: who, pose: pose], []},
       {:blind, [robot: who, for_s: for_s], []},
       {:deaf, [robot: who, for_s: for_s], []}
@@ -191,7 +195,10 @@ defmodule Sim.Trial.Event do
       when name in [:kill, :estop],
       do: who
 
-  def robot({name, who, _more}) when name in [:tell, :freeze, :displace, :blind, :deaf], do: who
+  def robot({name, who, _more}) when name in [:tell, :freeze, :crash, :displace, :blind, :deaf],
+    do: who
+
+  def robot({:hang, who, _role, _for_s}), do: who
   def robot(_event), do: nil
 
   @doc "The event with the leader's name for `:leader`."
@@ -202,5 +209,6 @@ defmodule Sim.Trial.Event do
   @doc "For how many seconds an event lasts; 0 if it is done at once."
   @spec lasts_s(t()) :: number()
   def lasts_s({name, _robot, for_s}) when name in [:freeze, :blind, :deaf], do: for_s
+  def lasts_s({:hang, _robot, _role, for_s}), do: for_s
   def lasts_s(_event), do: 0
 end

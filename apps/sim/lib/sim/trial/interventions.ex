@@ -85,6 +85,14 @@ defmodule Sim.Trial.Interventions do
     end
   end
 
+  defp act({:crash, id, role}, trial),
+    do: {stage(trial, :crashed, id, %{crash: "its #{role}, by the script"}), [{id, {:crash, role}}]}
+
+  defp act({:hang, id, role, for_s}, trial) do
+    until_ms = trial.at_ms + round(for_s * 1000)
+    {stage(trial, :hangs, id, %{role: role, for_s: for_s}), [{id, {:hang, role, until_ms}}]}
+  end
+
   defp act({:freeze, id, for_s}, trial), do: {fault(trial, :frozen, id, for_s), []}
   defp act({:blind, id, for_s}, trial), do: {fault(trial, :blind, id, for_s), []}
   defp act({:deaf, id, for_s}, trial), do: {fault(trial, :deaf, id, for_s), []}

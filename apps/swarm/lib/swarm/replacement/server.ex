@@ -7,7 +7,7 @@ defmodule Swarm.Replacement.Server do
   alias Swarm.Replacement
   alias Hal.{Event, HardenedServer}
   alias Mesh.{Nonblocking, Secret}
-  alias Robot.Names
+  alias Robot.{Board, Names}
   alias Robot.Control.{Delivery, Pilot}
   alias Swarm.Replacement.{Admission, Entries, Job, Order, Rehearsal}
 
@@ -251,7 +251,8 @@ defmodule Swarm.Replacement.Server do
     Pilot.deliver(robot, :start, %Delivery{
       ways: [{:start, module, options}],
       asked: entry.at_us,
-      until_ms: Hal.Clock.now_ms() + @start_ms,
+      # By the robot's clock; one that has gone is watched above.
+      until_ms: robot_ms(robot) + @start_ms,
       reply: {__MODULE__, :started, [id, robot]}
     })
 
@@ -343,6 +344,13 @@ defmodule Swarm.Replacement.Server do
     if {:robot, id} in Map.values(s.monitors),
       do: s,
       else: monitor(s, Names.whereis(id, :robot), {:robot, id})
+  end
+
+  defp robot_ms(robot) do
+    case Board.find(robot) do
+      {:ok, board} -> Board.now(board)
+      :error -> 0
+    end
   end
 
   defp monitor(s, nil, _what), do: s
