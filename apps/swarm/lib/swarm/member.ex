@@ -10,7 +10,7 @@ defmodule Swarm.Member do
   | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
-  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
+  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then what it forwards, then (5 Hz) the heartbeat |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
 
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
@@ -166,8 +166,9 @@ defmodule Swarm.Member do
 
   def step(member, {:tick, at_ms}) do
     {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
-    {member, beats} = beat(member, at_ms)
-    {member, effects ++ beats}
+    {receiver, forwarded} = Receiver.forward(member.receiver, at_ms)
+    {member, beats} = beat(%{member | receiver: receiver}, at_ms)
+    {member, effects ++ forwarded ++ beats}
   end
 
   def step(member, {:reflex, at_ms}), do: gate(member, :tick, at_ms)
@@ -218,7 +219,12 @@ defmodule Swarm.Member do
     {member, stood ++ begun ++ effects}
   end
 
-  defp heard(member, {:message, message}, _at_ms), do: handle(member, {:message, message})
+  defp heard(member, {:message, message}, at_ms) do
+    {receiver, forwarded} = Receiver.forward(member.receiver, message, at_ms)
+    {member, effects} = handle(%{member | receiver: receiver}, {:message, message})
+    {member, forwarded ++ effects}
+  end
+
   defp heard(member, :nothing, _at_ms), do: {member, []}
 
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
