@@ -22,10 +22,11 @@ defmodule Swarm.Message.Forwarder do
   @alive_ms 1_000
   @relays 2
 
-  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}
+  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}, whole: %{}
 
   @typedoc """
-  `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `missing`
+  `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `whole` has the
+  lists in which none of them was missing, because the next ones of the same robots are mostly equal. `missing`
   says since when a robot (the second of the pair) has not heard another; `beats` and
   `letters` say what was last forwarded from which robot to which.
   """
@@ -33,7 +34,8 @@ defmodule Swarm.Message.Forwarder do
           missing: %{{atom(), atom()} => integer()},
           beats: %{{atom(), atom()} => {integer(), integer()}},
           letters: %{{atom(), atom()} => {non_neg_integer(), integer()}},
-          heard: {[atom()], NameSet.t()}
+          heard: {[atom()], NameSet.t()},
+          whole: %{atom() => NameSet.t()}
         }
 
   @typedoc "The robots that were heard of: their newest heartbeats, and when they were heard (`Swarm.Membership.Peers`)."
@@ -56,33 +58,48 @@ defmodule Swarm.Message.Forwarder do
   @doc "The heartbeats to forward now, as `{:send, [to], message}`."
   @spec beats(t(), atom(), peers(), integer()) :: {t(), [sending()]}
   def beats(relay, me, peers, now_ms) do
-    {names, all} = heard = heard(relay.heard, me, peers, now_ms)
+    {names, _all} = heard = heard(relay.heard, me, peers, now_ms)
+    whole = if heard == relay.heard, do: relay.whole, else: %{}
+    {lacking, whole} = Enum.reduce(names, {[], whole}, &look(&1, &2, heard, peers))
+    relay = %{relay | heard: heard, whole: whole}
 
     pairs =
-      for to <- names,
-          %{^to => %{beat: %{heard: roll}}} = peers,
-          not NameSet.all_but?(roll, all, to),
+      for {to, roll} <- Enum.reverse(lacking),
           NameSet.member?(roll, me),
           from <- names -- NameSet.names(roll),
           from != to,
           do: {from, to}
 
     if pairs == [] and relay.missing == %{},
-      do: {%{relay | heard: heard}, []},
-      else: forward(%{relay | heard: heard}, me, peers, pairs, now_ms)
+      do: {relay, []},
+      else: forward(relay, me, peers, pairs, now_ms)
+  end
+
+  defp look(to, {lacking, whole}, {_names, all}, peers) do
+    %{^to => %{beat: %{heard: roll}}} = peers
+
+    cond do
+      match?(%{^to => ^roll}, whole) -> {lacking, whole}
+      NameSet.all_but?(roll, all, to) -> {lacking, Map.put(whole, to, roll)}
+      true -> {[{to, roll} | lacking], whole}
+    end
   end
 
   # Those that are heard now, and the set of these and of this robot: mostly the same as before.
   defp heard({names, _all} = before, me, peers, now_ms) do
-    ids = for {id, peer} <- Map.to_list(peers), alive?(peer, now_ms), do: id
-
-    if length(ids) == length(names) and Enum.all?(names, &known?(peers, &1, now_ms)) do
+    if Enum.all?(names, &known?(peers, &1, now_ms)) and others(peers, length(names), now_ms) == 0 do
       before
     else
-      names = Enum.sort(ids)
+      names = Enum.sort(for {id, peer} <- peers, alive?(peer, now_ms), do: id)
       {names, NameSet.new([me | names])}
     end
   end
+
+  # How many more than these are heard now.
+  defp others(peers, count, _now_ms) when map_size(peers) == count, do: 0
+
+  defp others(peers, count, now_ms),
+    do: Enum.count(peers, fn {_id, peer} -> alive?(peer, now_ms) end) - count
 
   defp known?(peers, id, now_ms) do
     case peers do

@@ -58,6 +58,23 @@ defmodule Swarm.Message.ForwarderTest do
     assert {_relay, []} = run([mag1: [], mag3: [:mag1, :mag2]], 10)
   end
 
+  test "begins when a list that was whole lacks a robot, and ends when it has it again" do
+    together = [mag1: [:mag2, :mag3], mag3: [:mag1, :mag2]]
+    lacks = [mag1: [:mag2, :mag3], mag3: [:mag2]]
+    # A robot comes whose list is whole, too.
+    four = [mag1: [:mag2, :mag3, :mag4], mag3: [:mag1, :mag2, :mag4], mag4: [:mag1, :mag2, :mag3]]
+
+    {_relay, sent} =
+      [together, together, lacks, lacks, lacks, lacks, together, four, lacks ++ [four: [:mag2]]]
+      |> Enum.with_index(1)
+      |> Enum.reduce({Forwarder.new(), []}, fn {heard, n}, {relay, all} ->
+        {relay, sent} = Forwarder.beats(relay, :mag2, peers(heard, n * 100), n * 100)
+        {relay, all ++ Enum.map(summary(sent), &{n, &1})}
+      end)
+
+    assert sent == [{6, {[:mag3], :mag1, 1}}]
+  end
+
   test "of several robots that could forward, the first two do" do
     all = [:aaa, :bbb, :mag1, :mag2, :mag3]
     others = [aaa: all -- [:aaa], bbb: all -- [:bbb]]
