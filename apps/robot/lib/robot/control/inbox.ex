@@ -103,6 +103,7 @@ defmodule Robot.Control.Inbox do
         power: power,
         ptz: ptz,
         detections: detections,
+        objects: objects,
         peers: peers,
         driving: driving,
         grid: nil
@@ -113,7 +114,7 @@ defmodule Robot.Control.Inbox do
         keys?(profile, Profile) and (pose == nil or pose?(pose)) and uncertainty?(uncertainty) and
           odometry?(odometry) and ranges?(sonar) and ranges?(ir) and
           all?(bumpers, &is_integer/1) and ptz?(ptz) and detections?(detections) and
-          driving?(driving) and all?(Map.values(peers), &peer?/1)
+          objects?(objects) and driving?(driving) and all?(Map.values(peers), &peer?/1)
 
   def percept?(_other), do: false
 
@@ -183,6 +184,14 @@ defmodule Robot.Control.Inbox do
        do: (pose == nil or pose?(pose)) and all?(blobs, &blob?/1)
 
   defp detections?(_other), do: false
+
+  defp objects?(nil), do: true
+  defp objects?(objects), do: is_map(objects) and all?(Map.to_list(objects), &object?/1)
+
+  defp object?({colour, %{blob: blob, bearing: bearing}}) when is_measure(bearing),
+    do: is_binary(colour) and blob?(blob)
+
+  defp object?(_other), do: false
 
   defp blob?(%{__struct__: Blob, colour: colour, distance: distance, clipped?: clipped?} = blob)
        when is_binary(colour) and (distance == nil or is_measure(distance)) and

@@ -109,6 +109,8 @@ defmodule Robot.Control.InboxTest do
           sonar: [1.0 | 2.0],
           bumpers: :none,
           detections: %{blobs: []},
+          objects: [1 | 2],
+          objects: %{"Red" => %{blob: nil, bearing: 0.0}},
           peers: %{mag2: %{}},
           uncertainty: %{radius: 1.0}
         ],
@@ -147,6 +149,7 @@ defmodule Robot.Control.InboxTest do
       odometry: %Hal.Odometry{pose: pose, twist: Twist.zero()},
       sonar: List.duplicate(5.1, 24),
       detections: %Vision.Detections{at_ms: 1, blobs: List.duplicate(blob, 10)},
+      objects: Map.new(["Red", "Blue"], &{&1, %{blob: blob, bearing: 0.1}}),
       peers: Map.new(1..20, &{:"mag#{&1}", peer}),
       driving: %{twist: Twist.zero(), limits: [:near]}
     }
