@@ -143,7 +143,7 @@ defmodule Bench.Goto do
   defp go(trial, kind, limit_ms) do
     trial = Trial.step(trial)
 
-    case Trial.robot(trial, kind).runner do
+    case Trial.robot(trial, kind).pilot.runner do
       %{phase: :done} -> {trial, :done}
       %{phase: :given_up, claim: %{blocked_by: why}} -> {trial, {:given_up, why}}
       _under_way -> go(trial, kind, limit_ms)

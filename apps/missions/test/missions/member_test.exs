@@ -160,7 +160,7 @@ defmodule Swarm.MemberTest do
       before = member()
       later = hear(before, term)
       assert later.receiver.rejected == %{reason => 1}, inspect(term, limit: 5)
-      assert later.runner == before.runner
+      assert later.pilot.runner == before.pilot.runner
     end
   end
 
@@ -179,7 +179,7 @@ defmodule Swarm.MemberTest do
 
     two = hear(member(:mag3), pressed)
     assert two.stop.held == one.stop.held
-    assert sense(two, 100).runner.phase == :idle
+    assert sense(two, 100).pilot.runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
 
@@ -214,7 +214,7 @@ defmodule Swarm.MemberTest do
     assert v > 0
 
     {stopped, []} = Member.step(rolling, {:command, :stop, 200})
-    assert %{phase: :idle, module: nil, mission: nil, claim: claim} = stopped.runner
+    assert %{phase: :idle, module: nil, mission: nil, claim: claim} = stopped.pilot.runner
     assert claim == %{}
     assert Member.stands?(stopped)
     assert stands?(stopped, 200)
@@ -290,7 +290,7 @@ defmodule Swarm.MemberTest do
 
     picture = &{:detections, %Vision.Detections{at_ms: &1, blobs: [blob]}}
     {searches, []} = member() |> sense(100) |> Member.step(picture.(200))
-    assert %{phase: :search} = searches.runner
+    assert %{phase: :search} = searches.pilot.runner
     evaluated = {Robot.Percept.Sighting, :bearing, 3}
     cautious = {Robot.Behaviour.Avoid.Caution, :check, 3}
 
@@ -332,8 +332,8 @@ defmodule Swarm.MemberTest do
     {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
     {stopped, []} = Member.step(member, {:command, :stop, 100})
     {started, []} = Member.step(stopped, {:command, :start, 200})
-    assert %{formation: {:wedge, 1.2}, started?: true} = started.runner.mission
-    assert sense(started, 300).runner.phase == :search
+    assert %{formation: {:wedge, 1.2}, started?: true} = started.pilot.runner.mission
+    assert sense(started, 300).pilot.runner.phase == :search
   end
 
   test "while it is stopped, it accepts no command but stop" do

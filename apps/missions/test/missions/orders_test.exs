@@ -162,13 +162,13 @@ defmodule Swarm.OrdersTest do
     # The board still shows the mission.
     answer = Task.async(fn -> Swarm.ask(id, :start) end)
 
-    asked? = &match?({_call, _from, {:command, :start}}, &1)
+    asked? = &match?({:"$gen_cast", {:deliver, _delivery, {:command, :start}}}, &1)
     eventually(fn -> Enum.any?(queued(pilot), asked?) end)
 
     :ok = :sys.resume(pilot)
     assert Task.await(answer) == :ok
     assert {Missions.Landmark, _phase} = state(id)
-    {_state, %{runner: %{mission: mission}}} = :sys.get_state(pilot)
+    %{state: %{runner: %{mission: mission}}} = :sys.get_state(pilot)
     assert {:wedge, _spacing} = mission.formation
   end
 
@@ -310,7 +310,7 @@ defmodule Swarm.OrdersTest do
       assert order(fn -> Swarm.formation(:wedge, spacing: 1.2) end) == :ok
       assert order(fn -> Swarm.stop(id) end) == :ok
       assert order(fn -> Swarm.start(robots: [id]) end) == :ok
-      {_state, %{runner: %{mission: mission}}} = :sys.get_state(Names.whereis(id, :pilot))
+      %{state: %{runner: %{mission: mission}}} = :sys.get_state(Names.whereis(id, :pilot))
       assert mission.formation == {:wedge, 1.2}
     end
   end

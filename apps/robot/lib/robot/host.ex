@@ -5,7 +5,7 @@ defmodule Robot.Host do
   """
   use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Ticker}
-  alias Robot.{Board, Names, Trace}
+  alias Robot.{Board, Names, Role, Trace}
   alias Robot.Control.Crash
 
   @slow_us 50_000
@@ -18,7 +18,8 @@ defmodule Robot.Host do
   @doc "Starts the process of a role. The robot's board must be running."
   @spec start_link({module(), Robot.Config.t()}) :: GenServer.on_start()
   def start_link({role, %Robot.Config{id: id}} = arg) do
-    options = [name: Names.via(id, role.name()), spawn_opt: [priority: role.priority()]]
+    spawned = [priority: role.priority(), message_queue_data: :off_heap]
+    options = [name: Names.via(id, role.name()), spawn_opt: spawned]
     HardenedServer.start_link(__MODULE__, arg, options)
   end
 
@@ -27,11 +28,13 @@ defmodule Robot.Host do
     board = Board.find!(config.id)
     at_ms = Robot.Config.now(config)
     {state, effects} = role.init(config, board, at_ms)
-    ticker = Robot.Config.ticker(config, :tick, role.period_ms())
+    period_ms = role.period_ms()
+    ticker = period_ms && Robot.Config.ticker(config, :tick, period_ms)
 
     s = %{
       role: role,
       perceives?: function_exported?(role, :perceive, 3),
+      foreign?: function_exported?(role, :foreign, 2),
       config: config,
       board: board,
       state: state,
@@ -47,13 +50,18 @@ defmodule Robot.Host do
   def handle_call(message, from, s), do: arrived({:ask, from, message}, s)
 
   @impl GenServer
+  def handle_cast({:tick, _percept} = message, s) do
+    checkpoint(s, Robot.Config.now(s.config))
+    arrived({:cast, message}, s)
+  end
+
   def handle_cast(message, s), do: arrived({:cast, message}, s)
 
   @impl GenServer
   def handle_info(:tick, s) do
     begun_us = System.monotonic_time(:microsecond)
     at_ms = Robot.Config.now(s.config)
-    Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
+    checkpoint(s, at_ms)
     s = tick(s, at_ms)
     took_us = System.monotonic_time(:microsecond) - begun_us
 
@@ -65,38 +73,58 @@ defmodule Robot.Host do
     {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
   end
 
-  defp arrived(input, s) do
-    at_ms = Robot.Config.now(s.config)
+  defp checkpoint(s, at_ms),
+    do: Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
 
-    case s.role.handle(input, at_ms, s.state, s.board) do
+  defp arrived(input, s) do
+    case hand(input, s, Robot.Config.now(s.config)) do
       :unknown -> HardenedServer.drop(s)
-      handled -> {:noreply, handled(input, handled, s, at_ms)}
+      s -> {:noreply, s}
     end
   end
 
-  # Behaviours may be foreign code.
   defp tick(s, at_ms) do
     input = if s.perceives?, do: s.role.perceive(at_ms, s.state, s.board), else: :tick
+    hand(input, s, at_ms)
+  end
 
+  # Behaviours and missions may be foreign code.
+  defp hand(input, s, at_ms) do
     Crash.told(s.config, s.board, s.role.name(), fn ->
-      handled(input, s.role.handle(input, at_ms, s.state, s.board), s, at_ms)
+      case marked(input, s, at_ms, fn -> s.role.handle(input, at_ms, s.state, s.board) end) do
+        :unknown -> :unknown
+        handled -> handled(input, handled, s, at_ms)
+      end
     end)
+  end
+
+  # Each call has another mark. That of one that fails is left to its successor.
+  defp marked(input, s, at_ms, call) do
+    module = if s.foreign?, do: s.role.foreign(input, s.state)
+
+    if module == nil do
+      call.()
+    else
+      act({:put, :asking, {module, System.unique_integer()}}, s, at_ms)
+      handled = call.()
+      act({:delete, :asking}, s, at_ms)
+      handled
+    end
   end
 
   # What was refused, by what the board said then, has changed nothing and is not recorded.
   defp handled(input, {state, effects}, s, at_ms) do
-    if state !== s.state or Enum.any?(effects, &Trace.effect?/1),
-      do: Trace.input(s.config, s.role.name(), recorded(input), at_ms)
+    if state !== s.state or Enum.any?(effects, &Role.recorded?/1),
+      do: Trace.input(s.config, s.role.name(), Role.recorded(input), at_ms)
 
     carry_out(effects, %{s | state: state}, at_ms)
   end
 
-  defp recorded({:ask, _from, message}), do: {:ask, nil, message}
-  defp recorded(input), do: input
-
   defp carry_out(effects, s, at_ms) do
     Enum.reduce(effects, s, fn effect, s ->
-      if Trace.effect?(effect), do: Trace.effect(s.config, s.role.name(), effect, at_ms)
+      if Role.recorded?(effect),
+        do: Trace.effect(s.config, s.role.name(), Role.recorded(effect), at_ms)
+
       carry_out_one(effect, s, at_ms)
     end)
   end
@@ -133,7 +161,20 @@ defmodule Robot.Host do
   defp act({:answer_saved, from}, s, _at_ms),
     do: Board.saved(s.board, {GenServer, :reply, [from]})
 
-  defp act({:apply, {m, f, a}}, _s, _at_ms), do: apply(m, f, a)
+  defp act({:apply, then}, s, at_ms), do: act({:apply, then, []}, s, at_ms)
+  defp act({:apply, nil, _more}, _s, _at_ms), do: :ok
+  defp act({:apply, {m, f, a}, more}, _s, _at_ms), do: apply(m, f, a ++ more)
+
+  defp act({:send, to, message}, s, _at_ms),
+    do: with({m, f, a} <- s.config.send, do: apply(m, f, a ++ [to, message]))
+
+  defp act({:stage, stage, about}, s, at_ms),
+    do: act({:event, [:robot, :stage], Map.put(about, :stage, stage)}, s, at_ms)
+
+  defp act({:phase, state}, s, at_ms),
+    do: act({:event, [:robot, :pilot, :phase], %{state: state}}, s, at_ms)
+
+  defp act({:claim, _claim}, _s, _at_ms), do: :ok
 
   defp act({:event, name, about}, s, at_ms),
     do: Event.execute(name, %{at_ms: at_ms}, Map.put(about, :robot, s.config.id))

@@ -219,7 +219,7 @@ defmodule Robot.Recorder do
   defp take(s, id, {_role, :lost, count, _at_ms} = entry, _now_ms),
     do: add(%{s | lost: s.lost + count}, id, entry)
 
-  defp take(s, id, {_role, kind, {state, _facts}, at_ms} = entry, now_ms)
+  defp take(s, id, {_role, kind, %_{} = state, at_ms} = entry, now_ms)
        when kind in [:begin, :checkpoint],
        do: s |> know(id, state, now_ms + s.unix_ms - at_ms) |> add(id, entry)
 

@@ -121,7 +121,6 @@ defmodule Robot.Replay do
   @spec state(t(), robot :: atom(), role :: atom()) :: struct() | nil
   def state(%__MODULE__{parts: parts}, robot, role) do
     case parts do
-      %{{^robot, ^role} => %{state: {%_{} = state, _facts}}} -> state
       %{{^robot, ^role} => %{state: %_{} = state}} -> state
       _unknown -> nil
     end
@@ -144,22 +143,18 @@ defmodule Robot.Replay do
   end
 
   # Whatever a role that crashed has not done any more is not compared.
-  defp entry(part, :begin, state, at_ms, role) do
+  defp entry(part, :begin, state, at_ms, _role) do
     {part, difference} = settle(part, :cut)
-    {state, effects} = Roles.begin(role, state)
-    part = %{part | state: state, input: {:begin, at_ms}, replayed: effects, recorded: []}
+    part = %{part | state: state, input: {:begin, at_ms}, replayed: [], recorded: []}
     {count(part, :begun), difference}
   end
 
-  defp entry(%{state: {:crashed, _line}} = part, :checkpoint, state, _at_ms, role) do
-    {taken, []} = Roles.begin(role, state)
-    {%{part | state: taken, replayed: [], recorded: []}, crashed(part)}
-  end
+  defp entry(%{state: {:crashed, _line}} = part, :checkpoint, taken, _at_ms, _role),
+    do: {%{part | state: taken, replayed: [], recorded: []}, crashed(part)}
 
-  defp entry(part, :checkpoint, state, at_ms, role) do
+  defp entry(part, :checkpoint, taken, at_ms, _role) do
     {part, difference} = settle(part, :whole)
     {reached, part} = {part.state, %{part | input: {:checkpoint, at_ms}}}
-    {taken, []} = Roles.begin(role, state)
 
     cond do
       difference != nil or reached == nil ->

@@ -20,13 +20,17 @@ defmodule Robot.Role do
   | `{:cast, role, message}` | hands a message to another role |
   | `{:answer, from, result}` | answers `:ask` |
   | `{:answer_saved, from}` | answers `:ask` once the latch is in its file (`Robot.Board.saved/2`) |
-  | `{:apply, {m, f, a}}` | tells a part that waits for this |
+  | `{:apply, then}`, `{:apply, then, more}` | tells a part that waits for this (`t:then/0`) |
+  | `{:send, to, message}` | sends a message to other robots (`Robot.Config`, `:send`) |
+  | `{:stage, name, about}` | tells people a stage of the mission (event `[:robot, :stage]`) |
+  | `{:phase, state}` | tells that the mission came to this state (event `[:robot, :pilot, :phase]`) |
+  | `{:claim, claim}` | nothing: the claim is on the board; a recording shows it |
   | `{:event, name, about}` | tells listeners (`Hal.Event`), with the time and the robot's name |
   | `:tick` | hands the role a tick now, before any other input |
 
-  Effects are carried out in the order of the list. `Robot.Trace` records `:drive`, `:look` and those to other roles.
+  Effects are carried out in the order of the list. `Robot.Trace` records those that others notice (`recorded?/1`).
   """
-  alias Hal.Twist
+  alias Hal.{HardenedServer, Twist}
   alias Robot.Board
 
   @type input ::
@@ -35,6 +39,9 @@ defmodule Robot.Role do
           | :tick
           | {:tick, Robot.Percept.t()}
   @type state :: struct()
+
+  @typedoc "What waits for a role: `{m, f, a}`, nothing, or what a recording has in place of the first."
+  @type then :: Robot.Config.call() | nil | :recorded
 
   @type effect ::
           {:drive, Twist.t(), limits :: [atom()]}
@@ -46,15 +53,20 @@ defmodule Robot.Role do
           | {:cast, role :: atom(), message :: term()}
           | {:answer, GenServer.from() | nil, result :: term()}
           | {:answer_saved, GenServer.from() | nil}
-          | {:apply, Robot.Config.call()}
+          | {:apply, then()}
+          | {:apply, then(), more :: [term()]}
+          | {:send, to :: atom() | [atom()] | :all, struct()}
+          | {:stage, atom(), map()}
+          | {:phase, :idle | {module(), atom()}}
+          | {:claim, map()}
           | {:event, Hal.Event.name(), map()}
           | :tick
 
   @doc "Its name, under which others reach it (`Robot.Names`) and which it has as a writer of the board."
   @callback name() :: atom()
 
-  @doc "The time between two ticks."
-  @callback period_ms() :: pos_integer()
+  @doc "The time between two ticks; `nil` for a role that has none."
+  @callback period_ms() :: pos_integer() | nil
 
   @doc "That of its process: `:high` for what must not wait for those that communicate and compute."
   @callback priority() :: :normal | :high
@@ -65,9 +77,44 @@ defmodule Robot.Role do
 
   @doc "The input of a tick, for a role whose ticks read the board."
   @callback perceive(at_ms :: integer(), state(), Board.t()) :: input()
-  @optional_callbacks perceive: 3
+
+  @doc "The module of others whose code runs on this input, so that one that hangs is found and named."
+  @callback foreign(input(), state()) :: module() | nil
+  @optional_callbacks perceive: 3, foreign: 2
 
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::
               {state(), [effect()]} | :unknown
+
+  @doc "Whether a term is `t:then/0`, which can be applied with so many more arguments."
+  @spec then?(term(), more :: non_neg_integer()) :: boolean()
+  def then?(then, more \\ 0),
+    do: then in [nil, :recorded] or HardenedServer.callable?(then, more)
+
+  @doc "Whether an effect is recorded: what other roles, robots, devices and people notice."
+  @spec recorded?(effect()) :: boolean()
+  def recorded?(effect),
+    do: elem_or_self(effect) in [:drive, :look, :cast, :send, :stage, :phase, :claim]
+
+  defp elem_or_self(effect) when is_tuple(effect), do: elem(effect, 0)
+  defp elem_or_self(effect), do: effect
+
+  @doc """
+  An input or an effect as a recording holds it: without those that wait, which are processes of that run.
+
+      iex> Robot.Role.recorded({:cast, {:halt, {Kernel, :send, [self(), :done]}}})
+      {:cast, {:halt, :recorded}}
+      iex> Robot.Role.recorded({:ask, {self(), make_ref()}, :reset})
+      {:ask, nil, :reset}
+  """
+  @spec recorded(input() | effect()) :: input() | effect()
+  def recorded({:ask, _from, message}), do: {:ask, nil, message}
+  def recorded({:cast, role, message}), do: {:cast, role, plain(message)}
+  def recorded({:cast, message}), do: {:cast, plain(message)}
+  def recorded(other), do: other
+
+  defp plain({kind, _then}) when kind in [:forget, :latch, :stand, :halt], do: {kind, :recorded}
+  defp plain({:confirm, _then, result}), do: {:confirm, :recorded, result}
+  defp plain({:deliver, delivery, event}), do: {:deliver, %{delivery | reply: :recorded}, event}
+  defp plain(message), do: message
 end

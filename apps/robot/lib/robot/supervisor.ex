@@ -47,7 +47,7 @@ defmodule Robot.Supervisor do
       {Host, {Gate, config}},
       {LivenessMonitor, config},
       {Host, {Executive, config}},
-      {Pilot, config}
+      {Host, {Pilot, config}}
     ]
 
     companions = for {module, options} <- config.companions, do: {module, {config, options}}

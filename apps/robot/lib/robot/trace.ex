@@ -4,31 +4,17 @@ defmodule Robot.Trace do
   pure functions behind them, and the outputs compared (`Robot.Replay`).
 
   The config's `:trace` is called as `apply(m, f, a ++ [{role, kind, what, at_ms}])`, in the
-  process of that role. The inputs (`:input`) and effects (`:effect`) are
+  process of that role. The inputs (`:input`) are those of `Robot.Role`, the effects (`:effect`) those that
+  `Robot.Role.recorded?/1` names.
 
-    * `:gate`, `:executive` - the inputs of a role (`Robot.Role`), and of its effects those of `effect?/1`
-    * `:pilot` - in: `{:start, module, options}`, `:stop`, `:resume`, `{:walls, packed}`, and the events of
-      `Robot.Mission`; out: `{:phase, state}` and the effects of `Robot.Mission`
-
-  An entry of the kind `:begin` has `state` or `{state, facts}`: with what the process starts, also after a
-  crash. One of the kind `:checkpoint` has a function that returns the same, of now. It is offered
-  at each tick or step, between two inputs; whoever wants one calls the function at once, in the
-  process that offers it. That of a role is the role's; that of the pilot is a `Robot.Mission.Runner` with facts that say
-  what else the effects depend on:
-
-    * `:pilot` - `state`: what it published last, `:idle` or `{mission, phase}`; `nil` at a start
+  An entry of the kind `:begin` has the state with which a role starts, also after a crash. One of the kind `:checkpoint`
+  has a function that returns that of now. It is offered at each tick, between two inputs; whoever wants one calls the
+  function at once, in the process that offers it.
   """
 
   @type kind :: :begin | :checkpoint | :input | :effect
   @type entry :: {role :: atom(), kind(), what :: term(), at_ms :: integer()}
-  @type state :: Robot.Role.state() | {struct(), map()}
-
-  @doc "Whether an effect of a role is recorded: what others get."
-  @spec effect?(Robot.Role.effect()) :: boolean()
-  def effect?({:drive, _twist, _limits}), do: true
-  def effect?({:look, _pan}), do: true
-  def effect?({:cast, _role, _message}), do: true
-  def effect?(_inside), do: false
+  @type state :: Robot.Role.state()
 
   @doc "Records an input of the process in this role."
   @spec input(Robot.Config.t(), atom(), term(), integer()) :: :ok

@@ -2,8 +2,8 @@ defmodule Robot.ReplayTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Behaviour.Move
-  alias Robot.Control.{Controller, Executive}
-  alias Robot.Mission.{Manual, Runner}
+  alias Robot.Control.{Controller, Executive, Pilot}
+  alias Robot.Mission.Manual
   alias Robot.{Percept, Recording, Replay}
   alias Robot.Replay.Roles
   alias Robot.Safety.Gate
@@ -34,8 +34,6 @@ defmodule Robot.ReplayTest do
 
   # What a process of this role records for these inputs, one a 50 ms.
   defp recorded(role, state, inputs, from_ms \\ 0) do
-    {state, effects} = Roles.begin(role, state)
-
     {entries, {state, at_ms}} =
       Enum.flat_map_reduce(inputs, {state, from_ms}, fn input, {state, at_ms} ->
         {state, effects} = Roles.input(role, state, input, at_ms)
@@ -44,7 +42,7 @@ defmodule Robot.ReplayTest do
          {state, at_ms + 50}}
       end)
 
-    {for(e <- effects, do: {role, :effect, e, from_ms}) ++ entries, state, at_ms}
+    {entries, state, at_ms}
   end
 
   defp replay(entries) do
@@ -168,8 +166,11 @@ defmodule Robot.ReplayTest do
     goal = {:cast, {:obey, {:goal, :go, {Move, linear: 0.2, turn: 0.0}}}}
     {entries, _, _} = recorded(:executive, begin, [goal, {:tick, percept}])
 
-    pilot = {Runner.new(:mag1), %{state: nil}}
-    {told, _, _} = recorded(:pilot, pilot, [{:start, Manual, []}, :stop])
+    pilot = begun(Pilot, [])
+
+    {told, _, _} =
+      recorded(:pilot, pilot, [{:ask, nil, {:start, Manual, []}}, {:ask, nil, :stop}])
+
     all = [{:executive, :begin, begin, 0} | entries] ++ [{:pilot, :begin, pilot, 0} | told]
 
     assert {counts, [], replay} = replay(all)
@@ -178,7 +179,7 @@ defmodule Robot.ReplayTest do
     assert reasons.percept.pose == Pose.new(1, 2)
     assert [{%{by: _chosen}, first} | rest] = reasons.wishes
     assert Enum.all?(rest, fn {_wish, weight} -> weight <= first end)
-    assert Runner.state(Replay.state(replay, :mag1, :pilot)) == :idle
+    assert Replay.state(replay, :mag1, :pilot).state == :idle
   end
 
   test "the walls that the sonars see go to the pilot once each time that they change, and are replayed" do
@@ -210,24 +211,28 @@ defmodule Robot.ReplayTest do
 
     assert {_, [], _} = replay([{:executive, :begin, begin, 0} | entries])
 
-    pilot = {Runner.new(:mag1), %{state: nil}}
-    {heard, {runner, _facts}, _} = recorded(:pilot, pilot, told)
+    pilot = begun(Pilot, [])
+
+    {heard, %{runner: runner}, _} =
+      recorded(:pilot, pilot, for(walls <- told, do: {:cast, walls}))
+
     assert %Robot.Navigation.Grid{} = grid = runner.grid
     assert grid == Controller.walls(controller)
     assert {_, [], replay} = replay([{:pilot, :begin, pilot, 0} | heard])
-    assert Replay.state(replay, :mag1, :pilot).grid == grid
+    assert Replay.state(replay, :mag1, :pilot).runner.grid == grid
   end
 
   test "a mission that crashed crashes again, and one that did not is named" do
-    begin = {Runner.new(:mag1), %{state: nil}}
-    {entries, state, at_ms} = recorded(:pilot, begin, [{:start, Fragile, []}, {:command, :a}])
+    begin = begun(Pilot, [])
+    start = {:ask, nil, {:start, Fragile, []}}
+    {entries, state, at_ms} = recorded(:pilot, begin, [start, {:cast, {:command, :a}}])
     entries = [{:pilot, :begin, begin, 0} | entries]
-    broken = {:pilot, :input, {:command, :break}, at_ms}
-    again = [{:pilot, :begin, begin, at_ms}, {:pilot, :effect, {:phase, :idle}, at_ms}]
+    broken = {:pilot, :input, {:cast, {:command, :break}}, at_ms}
+    again = [{:pilot, :begin, begin, at_ms}]
 
     assert {%{{:mag1, :pilot} => %{begun: 2}}, [], _} = replay(entries ++ [broken | again])
 
-    next = {:pilot, :input, {:command, :b}, at_ms + 50}
+    next = {:pilot, :input, {:cast, {:command, :b}}, at_ms + 50}
     assert {_, [difference], _} = replay(entries ++ [broken, next])
     assert difference.crash =~ "broken"
     checkpoint = {:pilot, :checkpoint, state, at_ms}

@@ -2,8 +2,7 @@ defmodule Robot.TraceTest do
   @moduledoc "What the processes do is what the functions say: recorded inputs, fed to both."
   use Robot.Case, async: false
   alias Hal.{Odometry, Pose}
-  alias Robot.Mission.Runner
-  alias Robot.Trace
+  alias Robot.Role
   @moduletag :realtime
 
   test "gate, executive and pilot do what the pure functions do on the same input" do
@@ -47,7 +46,7 @@ defmodule Robot.TraceTest do
 
     assert compare(entries, :gate, begun(entries, :gate), handle(Gate)) > 20
     assert compare(entries, :executive, begun(entries, :executive), handle(Executive)) > 20
-    assert compare(entries, :pilot, nil, &pilot/3) == 6
+    assert compare(entries, :pilot, begun(entries, :pilot), handle(Pilot)) > 6
   end
 
   @doc false
@@ -61,7 +60,7 @@ defmodule Robot.TraceTest do
   # the middle of something, so its last effects may be missing.
   defp compare(entries, role, state, step) do
     inputs = for {^role, :input, what, at_ms} <- entries, do: {what, at_ms}
-    effects = for {^role, :effect, what, _} <- entries, not match?({:phase, _}, what), do: what
+    effects = for {^role, :effect, what, _} <- entries, do: what
 
     {expected, _state} =
       Enum.flat_map_reduce(inputs, state, fn {what, at_ms}, state -> step.(what, at_ms, state) end)
@@ -77,7 +76,7 @@ defmodule Robot.TraceTest do
 
     fn input, at_ms, state ->
       {state, effects} = role.handle(input, at_ms, state, board)
-      {Enum.filter(effects, &Trace.effect?/1), state}
+      {for(e <- effects, Role.recorded?(e), do: Role.recorded(e)), state}
     end
   end
 
@@ -85,14 +84,4 @@ defmodule Robot.TraceTest do
     assert [state] = for({^role, :begin, state, _at_ms} <- entries, do: state)
     state
   end
-
-  defp pilot({:start, module, options}, _at_ms, nil),
-    do: :trace1 |> Runner.new() |> Runner.start(module, options) |> told()
-
-  # Its wheels were disarmed when its drive was opened.
-  defp pilot(:stop, _at_ms, nil), do: {[], nil}
-
-  defp pilot(event, _at_ms, runner), do: runner |> Runner.handle(event) |> told()
-
-  defp told({runner, effects}), do: {effects, runner}
 end

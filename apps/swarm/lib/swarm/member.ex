@@ -16,10 +16,11 @@ defmodule Swarm.Member do
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
   alias Hal.{Pose, Profile, Twist}
-  alias Robot.{Mission, Percept}
-  alias Robot.Control.{Controller, Executive, Pilot}
+  alias Robot.Percept
+  alias Robot.Control.{Controller, Delivery, Executive, Pilot}
   alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Gate
+  alias Swarm.Comms.CommandHandler
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
@@ -38,11 +39,11 @@ defmodule Swarm.Member do
                         :run
                       ])
 
-  @enforce_keys [:id, :profile, :boot, :mission, :runner, :executive, :gate, :receiver]
+  @enforce_keys [:id, :profile, :boot, :mission, :pilot, :executive, :gate, :receiver]
   defstruct @enforce_keys ++ [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil]
 
   @typedoc """
-  `mission` is the mission that a start begins, `runner` its state; `entries` holds the last
+  `mission` is the mission that a start begins; `entries` holds the last
   readings by name, with their times; `receiver` holds what was heard: peers, rejected messages;
   `stop` is the state of the emergency stop.
   """
@@ -51,7 +52,7 @@ defmodule Swarm.Member do
           profile: Profile.t(),
           boot: non_neg_integer(),
           mission: {module(), keyword()},
-          runner: Runner.t(),
+          pilot: Pilot.t(),
           executive: Executive.t(),
           gate: Gate.t(),
           receiver: Receiver.t(),
@@ -91,6 +92,7 @@ defmodule Swarm.Member do
     entries = %{arming: {%{state: :armed, why: nil}, 0}}
     {gate, _started} = Gate.init(config, entries, 0)
     {executive, _started} = Executive.init(config, entries, 0)
+    {pilot, _started} = Pilot.init(config, entries, 0)
     runner = Runner.new(options[:id], Controller.walls(executive.controller))
     {runner, []} = Runner.start(runner, module, mission_options)
 
@@ -99,7 +101,7 @@ defmodule Swarm.Member do
       profile: options[:profile],
       boot: options[:boot],
       mission: options[:mission],
-      runner: runner,
+      pilot: %{pilot | runner: runner, state: Runner.state(runner), options: mission_options},
       executive: executive,
       gate: gate,
       entries: entries,
@@ -134,35 +136,15 @@ defmodule Swarm.Member do
   # The mission does not get to interpret it, as in `Robot.Control.Pilot`.
   def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
 
-  def step(%{runner: %{module: running}} = member, {:command, :start, _at_ms})
-      when running in [nil, Manual] do
-    case Runner.resume(member.runner) do
-      {:ok, runner} -> handle(%{member | runner: runner}, {:command, :start})
-      {:error, :idle} -> begin(member, member.mission, :start)
+  def step(member, {:command, command, at_ms}) do
+    with {:ok, ways} <- ways(command, member) do
+      event = {:command, CommandHandler.command(command)}
+      delivery = %Delivery{ways: ways, until_ms: :infinity, reply: nil}
+      pilot(member, {:cast, {:deliver, delivery, event}}, at_ms)
+    else
+      {:error, _line} -> {member, []}
     end
   end
-
-  def step(member, {:command, {:start, module, options}, _at_ms}),
-    do: begin(member, {module, options}, :start)
-
-  def step(%{runner: %{module: module}} = member, {:command, command, _at_ms})
-      when is_alone(command) do
-    own? = module != nil and Mission.names?(module, Robot.Command.name(command))
-
-    if own? or module == Manual,
-      do: handle(member, {:command, command}),
-      else: begin(member, {Manual, []}, command)
-  end
-
-  def step(%{runner: %{module: module}} = member, {:command, {name, _, _} = command, _at_ms})
-      when name == :formation do
-    if module != nil and Mission.understands?(module, name),
-      do: handle(member, {:command, command}),
-      else: {member, []}
-  end
-
-  def step(%{runner: %{module: Manual}} = member, {:command, _command, _at_ms}), do: {member, []}
-  def step(member, {:command, command, _at_ms}), do: handle(member, {:command, command})
 
   def step(member, {:tick, at_ms}) do
     {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
@@ -198,7 +180,7 @@ defmodule Swarm.Member do
   What the robot's mission claims (`t:Robot.Mission.effect/0`).
   """
   @spec claim(t()) :: map()
-  def claim(member), do: member.runner.claim
+  def claim(member), do: member.pilot.runner.claim
 
   @doc "Who called the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
   @spec held(t()) :: [String.t()] | nil
@@ -208,20 +190,20 @@ defmodule Swarm.Member do
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
   def stands?(member),
-    do: Runner.state(member.runner) == :idle or member.executive.controller.tag == :stand
+    do: Runner.state(member.pilot.runner) == :idle or member.executive.controller.tag == :stand
 
-  # Replaces the mission that runs, if any; the ways are those of `Swarm.Comms.CommandHandler`.
-  defp begin(member, {module, options}, command) do
-    {runner, begun} = Runner.start(member.runner, module, options)
-    {member, stood} = carry_out(Pilot.Effects.dropped(), %{member | runner: runner})
-    {member, begun} = carry_out(begun, member)
-    {member, effects} = handle(member, {:command, command})
-    {member, stood ++ begun ++ effects}
-  end
+  # What people order goes the ways that it goes live; what a mission's own programs order is for the one that runs.
+  defp ways(command, member)
+       when is_alone(command) or command == :start or
+              (is_tuple(command) and elem(command, 0) in [:start, :formation]),
+       do: CommandHandler.ways(command, member)
+
+  defp ways(_other, _member), do: {:ok, [{:hand, {:except, Manual}}]}
 
   defp heard(member, {:message, message}, at_ms) do
     {receiver, forwarded} = Receiver.forward(member.receiver, message, at_ms)
-    {member, effects} = handle(%{member | receiver: receiver}, {:message, message})
+    member = %{member | receiver: receiver}
+    {member, effects} = pilot(member, {:cast, {:message, message}}, at_ms)
     {member, forwarded ++ effects}
   end
 
@@ -240,6 +222,11 @@ defmodule Swarm.Member do
     carry(effects, %{member | executive: executive}, at_ms)
   end
 
+  defp pilot(member, input, at_ms) do
+    {pilot, effects} = Pilot.handle(input, at_ms, member.pilot, member.entries)
+    carry(effects, %{member | pilot: pilot}, at_ms)
+  end
+
   # Carries out the effects of a role (`Robot.Role`): those that others notice are left.
   defp carry(effects, member, at_ms) do
     {out, member} = Enum.flat_map_reduce(effects, member, &carry_one(&1, &2, at_ms))
@@ -254,13 +241,22 @@ defmodule Swarm.Member do
   defp carry_one({:cast, :gate, message}, member, at_ms),
     do: back(gate(member, {:cast, message}, at_ms))
 
+  defp carry_one({:cast, :executive, message}, member, at_ms),
+    do: back(executive(member, {:cast, message}, at_ms))
+
   # As a pilot, which unpacks them.
   defp carry_one({:cast, :pilot, {:walls, _packed}}, member, _at_ms) do
     walls = Controller.walls(member.executive.controller)
-    {[], %{member | runner: Runner.walls(member.runner, walls)}}
+    {[], put_in(member.pilot.runner, Runner.walls(member.pilot.runner, walls))}
   end
 
-  defp carry_one({:cast, :pilot, event}, member, _at_ms), do: back(handle(member, event))
+  defp carry_one({:cast, :pilot, message}, member, at_ms),
+    do: back(pilot(member, {:cast, message}, at_ms))
+
+  defp carry_one({:send, to, body}, member, _at_ms),
+    do: {[{:send, to, Message.of(member.id, body)}], member}
+
+  defp carry_one({:stage, _name, _facts} = stage, member, _at_ms), do: {[stage], member}
   defp carry_one(_inside, member, _at_ms), do: {[], member}
 
   defp back({member, effects}), do: {effects, member}
@@ -303,26 +299,7 @@ defmodule Swarm.Member do
 
   defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
 
-  defp halt(member, at_ms) do
-    executive(%{member | runner: Runner.halt(member.runner)}, {:cast, {:stand, nil}}, at_ms)
-  end
-
-  defp handle(member, event) do
-    {runner, effects} = Runner.handle(member.runner, event)
-    carry_out(effects, %{member | runner: runner})
-  end
-
-  defp carry_out(effects, member) do
-    {out, member} =
-      effects |> Enum.flat_map(&Runner.actions/1) |> Enum.flat_map_reduce(member, &act/2)
-
-    {member, out}
-  end
-
-  defp act({:obey, order}, member), do: back(executive(member, {:cast, {:obey, order}}, 0))
-
-  defp act({:send, to, body}, member), do: {[{:send, to, Message.of(member.id, body)}], member}
-  defp act({:stage, _name, _facts} = stage, member), do: {[stage], member}
+  defp halt(member, at_ms), do: pilot(member, {:cast, {:halt, nil}}, at_ms)
 
   defp beat(member, at_ms) do
     with true <- Heartbeat.due?(member.beat_ms, at_ms),
@@ -331,9 +308,9 @@ defmodule Swarm.Member do
       sender = {member.boot, member.sequence + 1}
 
       claim =
-        if Runner.state(member.runner) == :idle,
+        if Runner.state(member.pilot.runner) == :idle,
           do: :idle,
-          else: {member.runner.module, claim(member)}
+          else: {member.pilot.runner.module, claim(member)}
 
       beat = Heartbeat.new(sender, percept, claim, heard, member.stop)
 

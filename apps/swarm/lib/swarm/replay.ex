@@ -74,8 +74,8 @@ defmodule Swarm.Replay do
       wishes: Controller.wishes(before.executive.controller, percept),
       driving: with({driving, _at_ms} <- member.entries[:driving], do: driving),
       stopped?: member.stop.held != [],
-      before: Runner.explain(before.runner),
-      mission: Runner.explain(member.runner),
+      before: Runner.explain(before.pilot.runner),
+      mission: Runner.explain(member.pilot.runner),
       effects: effects
     }
   end

@@ -4,7 +4,6 @@ defmodule Console.Replay.LiveText do
   alias Console.Cli.Format
   alias Console.Replay.{Options, Why}
   alias Hal.{Pose, Twist}
-  alias Robot.Mission.Runner
   alias Robot.Replay
 
   @doc "The first line: what the file has."
@@ -33,10 +32,10 @@ defmodule Console.Replay.LiveText do
 
   defp stood(replay, id) do
     reasons = reasons(replay, id)
-    runner = Replay.state(replay, id, :pilot)
+    pilot = Replay.state(replay, id, :pilot)
 
     words = [
-      runner && phase(Runner.state(runner)),
+      pilot && phase(pilot.state),
       reasons && place(reasons.percept),
       reasons && reasons.driving && driving(reasons.driving)
     ]

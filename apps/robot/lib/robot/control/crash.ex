@@ -29,10 +29,6 @@ defmodule Robot.Control.Crash do
   # Of a role that runs no code of others.
   def told(_config, _board, _role, function), do: function.()
 
-  @doc "Another mission begins."
-  @spec over(Board.t(), :pilot) :: :ok
-  def over(board, part), do: Board.delete(board, part, {:crashed, part})
-
   @doc """
   What happened and where, in one line: the first place in the stack that is neither Elixir's nor Erlang's.
 

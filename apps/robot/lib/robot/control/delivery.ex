@@ -36,16 +36,16 @@ defmodule Robot.Control.Delivery do
           {:error, :idle | :no_mission | :held | :stopped | :late | (line :: String.t())}
 
   @typedoc """
-  `until_ms` is when the requester stops waiting (`System.monotonic_time/1`, ms): a later command
+  `until_ms` is when the requester stops waiting, by the robot's clock (ms; `:infinity` in lockstep): a later command
   is refused. `asked` is the time of the request (`System.monotonic_time/1`, microseconds; `nil`
   if unknown): a request from before a stop is refused. `reply` is applied with `:ok` or a refusal
-  as its last argument.
+  as its last argument; `nil` for nobody that waits.
   """
   @type t :: %__MODULE__{
           ways: [way()],
           asked: integer() | nil,
-          until_ms: integer(),
-          reply: Robot.Config.call()
+          until_ms: integer() | :infinity,
+          reply: Robot.Role.then()
         }
 
   @doc """

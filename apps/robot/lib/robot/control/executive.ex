@@ -18,8 +18,8 @@ defmodule Robot.Control.Executive do
   A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """
   @behaviour Robot.Role
-  alias Hal.{HardenedServer, Odometry}
-  alias Robot.{Board, Departure, Mission, Names, Percept}
+  alias Hal.Odometry
+  alias Robot.{Board, Departure, Mission, Names, Percept, Role}
   alias Robot.Control.{Controller, Inbox}
   alias Robot.Safety.{DryRun, Readiness}
 
@@ -72,13 +72,6 @@ defmodule Robot.Control.Executive do
   def obey(robot, order), do: cast(robot, {:obey, order})
 
   @doc """
-  Applies `then` in the executive, once it has handled all that this process sent before. An
-  executive that hangs never does.
-  """
-  @spec confirm(robot :: atom(), then :: Robot.Config.call()) :: :ok
-  def confirm(robot, {_m, _f, _a} = then), do: cast(robot, {:confirm, then})
-
-  @doc """
   Drops the goal at once, and every goal that comes until the pilot, which is told to end the
   mission at the same time, says `stand/2`. A mission that runs late, or hangs, could otherwise
   set a goal after the stop. Until then nothing is confirmed.
@@ -100,16 +93,16 @@ defmodule Robot.Control.Executive do
 
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
-  @impl Robot.Role
+  @impl Role
   def name, do: :executive
 
-  @impl Robot.Role
+  @impl Role
   def period_ms, do: 100
 
-  @impl Robot.Role
+  @impl Role
   def priority, do: :normal
 
-  @impl Robot.Role
+  @impl Role
   def init(%Robot.Config{} = config, board, _at_ms) do
     departed = Board.departed(board)
     doing = %{by: :idle, weights: [], way: [], limits: [], outcome: nil, fault: nil, tick: 0}
@@ -136,10 +129,10 @@ defmodule Robot.Control.Executive do
   end
 
   @doc "The percept of a tick, before the pose is estimated: what a recording holds of the board."
-  @impl Robot.Role
+  @impl Role
   def perceive(at_ms, s, board), do: {:tick, Percept.Snapshot.take(board, s.profile, at_ms)}
 
-  @impl Robot.Role
+  @impl Role
   def handle({:tick, %Percept{} = raw}, _at_ms, s, _board), do: tick(s, raw)
 
   def handle({:ask, from, {:goal, _tag, _goal} = order}, _at_ms, s, board) do
@@ -158,10 +151,10 @@ defmodule Robot.Control.Executive do
     end
   end
 
-  def handle({:cast, {:confirm, then}}, _at_ms, s, _board) do
+  def handle({:cast, {:confirm, then, result}}, _at_ms, s, _board) do
     cond do
       s.held? -> {s, []}
-      HardenedServer.callable?(then) -> {s, [{:apply, then}]}
+      Role.then?(then, 1) -> {s, [{:apply, then, [result]}]}
       true -> :unknown
     end
   end
@@ -172,7 +165,7 @@ defmodule Robot.Control.Executive do
   def handle({:cast, :disarmed}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
 
   def handle({:cast, {:stand, then}}, _at_ms, s, _board) do
-    if HardenedServer.then?(then), do: drop(%{s | held?: false}, then), else: :unknown
+    if Role.then?(then), do: drop(%{s | held?: false}, then), else: :unknown
   end
 
   def handle(_unknown, _at_ms, _s, _board), do: :unknown

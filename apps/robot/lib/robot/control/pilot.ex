@@ -1,8 +1,7 @@
 defmodule Robot.Control.Pilot do
   @moduledoc """
-  Runs one robot's mission. Its state is `{:idle or {mission, phase}, data}`, so that
-  `:sys.get_state/1` shows what the robot is doing. It carries out the mission's effects
-  (`Robot.Control.Pilot.Effects`).
+  Runs one robot's mission (`Robot.Mission.Runner`): hands it what happens, and carries its effects on: orders to the
+  executive, messages to others, stages to people. What it does is on the board under `:mission`.
 
   It starts idle, and resets the executive: after a crash of the mission the robot stands until
   somebody starts a mission again.
@@ -11,35 +10,48 @@ defmodule Robot.Control.Pilot do
   stop to the executive, which drops its goal, and from there to the gate, after every older wish.
   Only the gate confirms the stop.
 
-  The mission's callbacks may be foreign code. While one runs, the board has an entry `:asking`,
+  The mission's callbacks may be foreign code. While one runs, the board has an entry `:asking` (`c:Robot.Role.foreign/2`),
   so that `Robot.Safety.LivenessMonitor` detects one that does not return, and kills the pilot.
 
   Wheels that are disarmed end the mission, whoever disarms them and whoever arms them again
   (`arm: :manual` or `:auto`), and while they may not turn none starts (`Robot.Safety.Readiness`).
   So arming starts no motion.
+
+  A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """
-  use Hal.HardenedServer
+  @behaviour Robot.Role
   alias Hal.HardenedServer
-  alias Robot.{Board, Mission, Names, Percept}
-  alias Robot.Control.{Crash, Delivery, Executive, Inbox}
-  alias Robot.Control.Pilot.{Effects, Journal}
+  alias Robot.{Board, Mission, Names, Percept, Role}
+  alias Robot.Control.{Delivery, Executive, Inbox}
+  alias Robot.Localiser.Anchors
   alias Robot.Mission.Runner
   alias Robot.Safety.{Gate, Readiness}
   alias Robot.Navigation.Grid
+  import Robot.Mission, only: [is_order: 1]
 
   # Generous, because a pilot may be slow on a busy machine.
   @call_ms 5_000
   # A percept that has waited longer than this is dropped; the next one is on its way.
   @old_ms 1_000
+  @dropped [{:goal, :idle, nil}, {:anchors, %Anchors{}}, {:look, nil}]
 
-  @doc "Starts the pilot of a robot."
-  @spec start_link(Robot.Config.t()) :: GenServer.on_start()
-  def start_link(%Robot.Config{} = config),
-    do:
-      HardenedServer.start_link(__MODULE__, config,
-        name: Names.via(config.id, :pilot),
-        spawn_opt: [message_queue_data: :off_heap]
-      )
+  @enforce_keys [:robot, :mission, :drive, :dry_run, :runner, :since_ms]
+  defstruct @enforce_keys ++ [state: :idle, options: []]
+
+  @typedoc """
+  `mission` is that of the config, `state` the last one told, since `since_ms`, `options` those of the mission that runs;
+  `drive` and `dry_run` say with `Robot.Safety.Readiness` whether an order may move the robot.
+  """
+  @type t :: %__MODULE__{
+          robot: atom(),
+          mission: Robot.Config.module_options() | nil,
+          drive: Robot.Config.module_options(),
+          dry_run: boolean(),
+          runner: Runner.t(),
+          since_ms: integer(),
+          state: Runner.state(),
+          options: keyword()
+        }
 
   @doc """
   Starts the mission of the robot's config; it replaces a running one. If the wheels may not turn now,
@@ -101,16 +113,13 @@ defmodule Robot.Control.Pilot do
   """
   @spec deliver(robot :: atom(), command :: term(), Delivery.t()) :: :ok
   def deliver(robot, command, %Delivery{} = delivery) do
-    with pid when is_pid(pid) <- Names.whereis(robot, :pilot),
-         do: send(pid, {:deliver, delivery, {:command, command}})
-
-    :ok
+    GenServer.cast(Names.via(robot, :pilot), {:deliver, delivery, {:command, command}})
   end
 
   @doc """
   Passes an event of `Robot.Mission` to the mission: a tick, new walls or an outcome from the executive, or a
-  message from another robot, which the sender of this event has checked. Of several waiting ticks
-  only the newest is handled.
+  message from another robot, which the sender of this event has checked. A tick that a
+  newer one follows is dropped.
   """
   @spec hear(robot :: atom(), Robot.Mission.event() | {:walls, Grid.Packed.t() | nil}) :: :ok
   def hear(robot, event), do: GenServer.cast(Names.via(robot, :pilot), event)
@@ -124,132 +133,143 @@ defmodule Robot.Control.Pilot do
 
   defp call(robot, request), do: GenServer.call(Names.via(robot, :pilot), request, @call_ms)
 
-  @impl GenServer
-  def init(%Robot.Config{} = config) do
-    data = %{
-      config: config,
-      board: Board.find!(config.id),
+  @impl Role
+  def name, do: :pilot
+
+  @impl Role
+  def period_ms, do: nil
+
+  @impl Role
+  def priority, do: :normal
+
+  # The former pilot may have crashed within a callback, and the executive may still have its
+  # goal, or wait for the end of a mission that has ended so.
+  @impl Role
+  def init(%Robot.Config{} = config, _board, at_ms) do
+    s = %__MODULE__{
+      robot: config.id,
+      mission: config.mission,
+      drive: config.drive,
+      dry_run: config.dry_run,
       runner: Runner.new(config.id, plan(config)),
-      options: [],
-      since_ms: Robot.Config.now(config)
+      since_ms: at_ms
     }
 
-    # The former pilot may have crashed within a callback, and the executive may still have its
-    # goal, or wait for the end of a mission that has ended so.
-    Journal.answered(data.board)
-    Journal.begun(data)
-    Effects.drop_orders(config)
-    Executive.stand(config.id)
-    {:ok, {:idle, Journal.told(:idle, %{}, data)}}
+    {s, [{:delete, :asking} | dropped()] ++ [{:cast, :executive, {:stand, nil}}] ++ told(s)}
   end
 
   # Walls that the sonars see come from the executive.
   defp plan(%{plan: %Grid{} = plan}), do: plan
   defp plan(_sonar_or_none), do: nil
 
-  @impl GenServer
-  def handle_call(:start, _from, {_state, %{config: %{mission: nil}}} = s),
-    do: {:reply, {:error, :no_mission}, s}
+  @doc "The mission whose code runs on this input."
+  @impl Role
+  def foreign({:ask, _from, {:start, module, _options}}, _s) when is_atom(module), do: module
 
-  def handle_call(:start, from, {_state, %{config: %{mission: {module, options}}}} = s),
-    do: handle_call({:start, module, options}, from, s)
+  def foreign({:cast, {:deliver, %{ways: [{:start, module, _options}]}, _command}}, _s)
+      when is_atom(module),
+      do: module
 
-  def handle_call({:start, module, options}, _from, {state, data} = s)
+  def foreign(_input, %{runner: %{module: module}}), do: module
+
+  @impl Role
+  def handle({:ask, from, :start}, _at_ms, %{mission: nil} = s, _board),
+    do: {s, [{:answer, from, {:error, :no_mission}}]}
+
+  def handle({:ask, from, :start}, at_ms, %{mission: {module, options}} = s, board),
+    do: answered(begin(module, options, at_ms, s, board), from, s)
+
+  def handle({:ask, from, {:start, module, options}}, at_ms, s, board)
       when is_atom(module) and is_list(options),
-      do: answer(begin(module, options, state, data), s)
+      do: answered(begin(module, options, at_ms, s, board), from, s)
 
-  def handle_call(:stop, from, s), do: {:noreply, idle(s, {GenServer, :reply, [from, :ok]})}
+  def handle({:ask, from, :stop}, at_ms, s, _board),
+    do: idle(s, from && {GenServer, :reply, [from, :ok]}, at_ms)
 
-  def handle_call(:resume, _from, {state, data} = s),
-    do: answer(go(:resume, {:command, :start}, state, data), s)
+  def handle({:ask, from, :resume}, at_ms, s, board),
+    do: answered(go(:resume, {:command, :start}, at_ms, s, board), from, s)
 
-  def handle_call(:map, _from, {_state, data} = s) do
-    map = Journal.asking(data.runner.module, data, fn -> Runner.map(data.runner) end)
-    {:reply, map, s}
+  def handle({:ask, from, :map}, _at_ms, s, _board),
+    do: {s, [{:answer, from, Runner.map(s.runner)}]}
+
+  def handle({:ask, from, {:command, _command}}, _at_ms, %{runner: %{module: nil}} = s, _board),
+    do: {s, [{:answer, from, {:error, :idle}}]}
+
+  def handle({:ask, from, {:command, _command} = event}, at_ms, s, board),
+    do: answered(go({:hand, s.runner.module}, event, at_ms, s, board), from, s)
+
+  def handle({:cast, {:halt, then}}, at_ms, s, _board),
+    do: if(Role.then?(then), do: idle(s, then, at_ms), else: :unknown)
+
+  def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
+  def handle({:cast, :disarmed}, at_ms, s, _board), do: idle(s, nil, at_ms)
+
+  def handle({:cast, {:tick, %Percept{at_ms: then_ms}}} = input, at_ms, s, board)
+      when is_integer(then_ms) do
+    if at_ms - then_ms > @old_ms or replaced?(then_ms, board),
+      do: {s, []},
+      else: hand(input, at_ms, s)
   end
 
-  def handle_call({:command, _command}, _from, {:idle, _data} = s),
-    do: {:reply, {:error, :idle}, s}
+  def handle({:cast, {:message, message}} = input, at_ms, s, _board) when is_map(message),
+    do: hand(input, at_ms, s)
 
-  def handle_call({:command, _command} = event, _from, {{module, _phase} = state, data} = s),
-    do: answer(go({:hand, module}, event, state, data), s)
+  def handle({:cast, {:outcome, _tag, outcome}} = input, at_ms, s, _board)
+      when is_integer(outcome),
+      do: hand(input, at_ms, s)
 
-  defp answer({:ok, state, data}, _s), do: {:reply, :ok, {state, data}}
-  defp answer(error, s), do: {:reply, error, s}
+  def handle({:cast, {:command, _command}} = input, at_ms, s, _board), do: hand(input, at_ms, s)
 
-  @impl GenServer
-  def handle_cast({:halt, then}, s) do
-    if HardenedServer.then?(then), do: {:noreply, idle(s, then)}, else: HardenedServer.drop(s)
-  end
-
-  def handle_cast(:disarmed, {_, %{config: %{dry_run: true}}} = s), do: {:noreply, s}
-  def handle_cast(:disarmed, s), do: {:noreply, idle(s, nil)}
-
-  # A mission is told only what `Robot.Mission` promises it.
-  def handle_cast({:tick, %Percept{at_ms: at_ms}} = event, {state, data} = s)
-      when is_integer(at_ms) do
-    Journal.checkpoint(state, data)
-    {:tick, percept} = event = newest(event)
-
-    cond do
-      old?(event, data.config) -> {:noreply, s}
-      Inbox.percept?(percept) -> {:noreply, hand(event, s)}
-      true -> HardenedServer.drop(s)
-    end
-  end
-
-  def handle_cast({:message, message} = event, s) when is_map(message),
-    do: {:noreply, hand(event, s)}
-
-  def handle_cast({:outcome, _tag, outcome} = event, s) when is_integer(outcome),
-    do: {:noreply, hand(event, s)}
-
-  def handle_cast({:walls, packed} = event, {state, data} = s) do
+  def handle({:cast, {:walls, packed}}, _at_ms, s, _board) do
     case Grid.Packed.unpack(packed) do
-      {:ok, walls} ->
-        Journal.heard(event, data)
-        {:noreply, {state, %{data | runner: Runner.walls(data.runner, walls)}}}
-
-      :error ->
-        HardenedServer.drop(s)
+      {:ok, walls} -> {%{s | runner: Runner.walls(s.runner, walls)}, []}
+      :error -> :unknown
     end
   end
 
-  def handle_cast({:command, _command} = event, s), do: {:noreply, hand(event, s)}
-
-  defp hand(_event, {:idle, _data} = s), do: s
-
-  defp hand(event, {{module, _phase} = state, data}) do
-    {:ok, state, data} = go({:hand, module}, event, state, data)
-    {state, data}
+  def handle({:cast, {:deliver, delivery, {:command, _command} = event}}, at_ms, s, board) do
+    if Inbox.delivery?(delivery), do: delivered(delivery, event, at_ms, s, board), else: :unknown
   end
 
-  @impl GenServer
-  def handle_info({:deliver, delivery, {:command, _command} = event}, s) do
-    if Inbox.delivery?(delivery), do: delivered(delivery, event, s), else: HardenedServer.drop(s)
+  def handle(_unknown, _at_ms, _s, _board), do: :unknown
+
+  # A robot that was frozen decides by what it perceives now: by its old percept a leader would
+  # believe that its lease lasts. And of several percepts that wait only the newest counts.
+  defp replaced?(then_ms, board) do
+    case Board.fetch(board, :doing, :infinity, 0) do
+      {:ok, _doing, ticked_ms} -> ticked_ms > then_ms
+      :error -> false
+    end
   end
 
-  defp delivered(%Delivery{reply: {m, f, a}} = delivery, event, {state, data} = s) do
-    with :ok <- timely(delivery, data),
-         {:ok, way} <- Delivery.way(delivery, state, data.runner.halted),
-         {:ok, state, data} <- go(way, event, state, data) do
-      # Only the executive can confirm that it has received the orders.
-      Executive.confirm(data.config.id, {m, f, a ++ [:ok]})
-      {:noreply, {state, data}}
+  defp answered({:ok, s, effects}, from, _s), do: {s, effects ++ [{:answer, from, :ok}]}
+  defp answered(error, from, s), do: {s, [{:answer, from, error}]}
+
+  defp hand(_input, _at_ms, %{runner: %{module: nil}} = s), do: {s, []}
+
+  defp hand({:cast, event}, at_ms, s) do
+    {:ok, s, effects} = follow(Runner.handle(s.runner, event), at_ms, s)
+    {s, effects}
+  end
+
+  # Only the executive can confirm that it has received the orders.
+  defp delivered(%Delivery{reply: reply} = delivery, event, at_ms, s, board) do
+    with :ok <- timely(delivery, at_ms, board),
+         {:ok, way} <- Delivery.way(delivery, Runner.state(s.runner), s.runner.halted),
+         {:ok, s, effects} <- go(way, event, at_ms, s, board) do
+      {s, effects ++ [{:cast, :executive, {:confirm, reply, :ok}}]}
     else
-      refusal ->
-        apply(m, f, a ++ [refusal])
-        {:noreply, s}
+      refusal -> {s, [{:apply, reply, [refusal]}]}
     end
   end
 
   # A command is refused if its requester no longer waits, or if the robot is stopped or was
   # stopped after the request.
-  defp timely(delivery, data) do
+  defp timely(delivery, at_ms, board) do
     cond do
-      Hal.Clock.now_ms() >= delivery.until_ms -> {:error, :late}
-      Board.latched?(data.board) -> {:error, :held}
-      stopped?(delivery.asked, data.board) -> {:error, :stopped}
+      at_ms >= delivery.until_ms -> {:error, :late}
+      Board.latched?(board) -> {:error, :held}
+      stopped?(delivery.asked, board) -> {:error, :stopped}
       true -> :ok
     end
   end
@@ -257,42 +277,39 @@ defmodule Robot.Control.Pilot do
   defp stopped?(nil, _board), do: false
 
   defp stopped?(asked, board) do
-    case Board.fetch(board, :stopped, :infinity) do
+    case Board.fetch(board, :stopped, :infinity, 0) do
       {:ok, stopped, _at_ms} -> asked < stopped
       :error -> false
     end
   end
 
   # Passes an event to a mission by the way that was chosen.
-  defp go({:hand, _module}, event, state, data),
-    do: event |> handle(data) |> follow(state, data)
+  defp go({:hand, _module}, event, at_ms, s, _board),
+    do: follow(Runner.handle(s.runner, event), at_ms, s)
 
-  defp go(:resume, event, state, data) do
-    with {:ok, runner} <- Runner.resume(data.runner),
-         :ok <- Readiness.of(data.config, data.board) do
-      Journal.heard(:resume, data)
-      Crash.over(data.board, :pilot)
-      go({:hand, runner.module}, event, state, %{data | runner: runner})
+  defp go(:resume, event, at_ms, s, board) do
+    with {:ok, runner} <- Runner.resume(s.runner),
+         :ok <- Readiness.of(s, board),
+         {:ok, s, effects} <- follow(Runner.handle(runner, event), at_ms, s),
+         do: {:ok, s, [{:delete, {:crashed, :pilot}} | effects]}
+  end
+
+  defp go({:start, module, options}, event, at_ms, s, board) do
+    with {:ok, s, begun} <- begin(module, options, at_ms, s, board),
+         {:ok, s, effects} <- follow(Runner.handle(s.runner, event), at_ms, s),
+         do: {:ok, s, begun ++ effects}
+  end
+
+  defp begin(module, options, at_ms, s, board) do
+    with {:ok, options} <- mission(module, options),
+         :ok <- Readiness.of(s, board) do
+      begun = Runner.start(s.runner, module, options)
+      {:ok, s, effects} = follow(begun, at_ms, %{s | options: options})
+      {:ok, s, [{:delete, {:crashed, :pilot}} | dropped()] ++ effects}
     end
   end
 
-  defp go({:start, module, options}, event, state, data) do
-    with {:ok, state, data} <- begin(module, options, state, data),
-         do: go({:hand, module}, event, state, data)
-  end
-
-  defp begin(module, options, state, data) do
-    with {:ok, options} <- mission(module, options, data),
-         :ok <- Readiness.of(data.config, data.board) do
-      Journal.heard({:start, module, options}, data)
-      Crash.over(data.board, :pilot)
-      Effects.drop_orders(data.config)
-      result = Journal.asking(module, data, fn -> Runner.start(data.runner, module, options) end)
-      follow(result, state, %{data | options: options})
-    end
-  end
-
-  defp mission(module, options, data) do
+  defp mission(module, options) do
     cond do
       not (HardenedServer.callable?({module, :init, []}, 2) and
                function_exported?(module, :handle, 2)) ->
@@ -301,49 +318,55 @@ defmodule Robot.Control.Pilot do
       not Keyword.keyword?(options) ->
         {:error, "expected options [key: value], got #{inspect(options, limit: 5)}"}
 
+      # Programs start one that checks nothing, such as a calibration; people are refused earlier.
       Mission.checks?(module) ->
-        Journal.asking(module, data, fn -> Mission.check_options(module, options, nil) end)
+        Mission.check_options(module, options, nil)
 
-      # Programs start it, such as a calibration; people are refused earlier.
       true ->
         {:ok, options}
     end
   end
 
-  # The board says idle before the answer. The mission is called last, because it cannot prevent
-  # this.
-  defp idle({state, data}, then) do
-    Journal.heard(:stop, data)
-    data = Journal.changed(state, :idle, %{}, data)
-    Executive.stand(data.config.id, then)
-    halted = Journal.asking(data.runner.module, data, fn -> Runner.halt(data.runner) end)
-    {:idle, %{data | runner: halted}}
+  # The board says idle before the answer.
+  defp idle(s, then, at_ms) do
+    {s, effects} = changed(%{s | runner: Runner.halt(s.runner)}, at_ms)
+    {s, effects ++ [{:cast, :executive, {:stand, then}}]}
   end
 
-  # Newer percepts may wait in this process's mailbox.
-  defp newest({:tick, _percept} = tick) do
-    receive do
-      {:"$gen_cast", {:tick, %Percept{at_ms: at_ms}} = newer} when is_integer(at_ms) ->
-        newest(newer)
-    after
-      0 -> tick
+  defp follow({runner, effects}, at_ms, s) do
+    {s, told} = changed(%{s | runner: runner}, at_ms)
+    {:ok, s, Enum.map(effects, &act/1) ++ told}
+  end
+
+  defp act(order) when is_order(order), do: {:cast, :executive, {:obey, order}}
+  defp act({:send, _to, _message} = send), do: send
+  defp act({:claim, claim} = told) when is_map(claim), do: told
+  defp act({:stage, name, about} = stage) when is_atom(name) and is_map(about), do: stage
+
+  # Makes the executive drop the orders of a mission that has ended.
+  defp dropped, do: for(order <- @dropped, do: act(order))
+
+  defp changed(%{state: state} = s, at_ms) do
+    case Runner.state(s.runner) do
+      ^state ->
+        {s, [written(s)]}
+
+      now ->
+        s = %{s | state: now, since_ms: at_ms}
+        {s, told(s)}
     end
   end
 
-  # A robot that was frozen decides by what it perceives now: by its old percept a leader would
-  # believe that its lease lasts.
-  defp old?({:tick, %{at_ms: at_ms}}, config), do: Robot.Config.now(config) - at_ms > @old_ms
+  defp told(s), do: [written(s), {:phase, s.state}]
 
-  defp handle(event, data) do
-    Journal.heard(event, data)
-    Journal.asking(data.runner.module, data, fn -> Runner.handle(data.runner, event) end)
-  end
-
-  defp follow({runner, effects}, before, data) do
-    data = %{data | runner: runner}
-    carry_out = fn -> Enum.each(effects, &Effects.carry_out(&1, data.config)) end
-    Crash.told(data.config, data.board, :pilot, carry_out)
-    state = Runner.state(runner)
-    {:ok, state, Journal.changed(before, state, runner.claim, data)}
+  defp written(s) do
+    {:put, :mission,
+     %{
+       state: s.state,
+       claim: s.runner.claim,
+       since_ms: s.since_ms,
+       ticked_ms: s.runner.ticked_ms,
+       options: s.options
+     }}
   end
 end

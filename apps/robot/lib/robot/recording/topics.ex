@@ -99,7 +99,7 @@ defmodule Robot.Recording.Topics do
   # With its blobs, at the time of their picture.
   defp boxes(messages, id, what, offset_ms) do
     for {{^id, :blobs}, ns, _data} <- messages,
-        {:tick, %{detections: %{at_ms: at_ms} = picture}} <- [what],
+        {:cast, :pilot, {:tick, %{detections: %{at_ms: at_ms} = picture}}} <- [what],
         do: {{id, :boxes}, ns, Drawing.boxes(unix_ns(at_ms, offset_ms), picture)}
   end
 
@@ -130,8 +130,14 @@ defmodule Robot.Recording.Topics do
   defp said(robot, id, {:gate, :input, {:cast, {:unlatch, _presses, _about}}}, _at_ms, ns),
     do: {robot, [log(ns, :warning, id, "reset")]}
 
-  defp said(robot, _id, {:pilot, :effect, {:goal, _tag, goal}}, _at_ms, _ns),
-    do: {%{robot | goal: goal_pose(goal)}, []}
+  defp said(
+         robot,
+         _id,
+         {:pilot, :effect, {:cast, :executive, {:obey, {:goal, _tag, goal}}}},
+         _at_ms,
+         _ns
+       ),
+       do: {%{robot | goal: goal_pose(goal)}, []}
 
   defp said(robot, id, {:pilot, :effect, {:claim, claim}}, at_ms, _ns),
     do: claim(robot, id, claim, at_ms)
@@ -141,7 +147,7 @@ defmodule Robot.Recording.Topics do
     {robot, [{{id, :messages}, message("#{id}", to, message)}]}
   end
 
-  defp said(robot, id, {:pilot, :input, {:message, message}}, _at_ms, _ns),
+  defp said(robot, id, {:pilot, :input, {:cast, {:message, message}}}, _at_ms, _ns),
     do: {robot, [{{id, :messages}, message(sender(message), ["#{id}"], message)}]}
 
   defp said(robot, id, {:pilot, :effect, {:phase, state}}, _at_ms, ns),

@@ -3,7 +3,7 @@ defmodule Robot.Replay.Moment do
   Describes what a replayed robot did last, and from what: kept during a replay, for people who ask why
   (`mix replay --why`). Pure.
   """
-  alias Robot.Control.{Controller, Executive}
+  alias Robot.Control.{Controller, Executive, Pilot}
   alias Robot.Mission.Runner
 
   defstruct at_ms: nil, tick: nil, driving: nil, mission: nil, stopped?: false, effects: []
@@ -40,9 +40,9 @@ defmodule Robot.Replay.Moment do
   def note(
         moment,
         :pilot,
-        {:input, {:tick, _percept}, _at_ms},
-        %{state: {%Runner{} = before, _}},
-        %{state: {%Runner{} = runner, _}}
+        {:input, {:cast, {:tick, _percept}}, _at_ms},
+        %{state: %Pilot{runner: before}},
+        %{state: %Pilot{runner: runner}}
       ),
       do: %{moment | mission: {before, runner}}
 
@@ -95,9 +95,6 @@ defmodule Robot.Replay.Moment do
 
   @doc "The parts of two states that differ, each side by the names of the parts."
   @spec parted(Robot.Trace.state(), Robot.Trace.state()) :: {keyword(), keyword()}
-  def parted({one, facts}, {other, facts}), do: parted(one, other)
-  def parted({_one, facts}, {_other, others}), do: {[facts: facts], [facts: others]}
-
   def parted(one, other) do
     keys =
       for {key, value} <- Enum.sort(Map.from_struct(one)),

@@ -17,8 +17,8 @@ defmodule Robot.Safety.Gate do
   A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """
   @behaviour Robot.Role
-  alias Hal.{HardenedServer, Twist}
-  alias Robot.{Board, Names}
+  alias Hal.Twist
+  alias Robot.{Board, Names, Role}
   alias Robot.Safety.{DryRun, Reflex}
 
   @enforce_keys [:robot, :reflex, :dry_run, :presses]
@@ -89,16 +89,16 @@ defmodule Robot.Safety.Gate do
          else: (:error -> 0)
   end
 
-  @impl Robot.Role
+  @impl Role
   def name, do: :gate
 
-  @impl Robot.Role
+  @impl Role
   def period_ms, do: 50
 
-  @impl Robot.Role
+  @impl Role
   def priority, do: :high
 
-  @impl Robot.Role
+  @impl Role
   def init(%Robot.Config{} = config, board, _at_ms) do
     latched? = Board.latched?(board)
     if config.dry_run, do: DryRun.attach()
@@ -123,14 +123,14 @@ defmodule Robot.Safety.Gate do
     {state, [{:event, [:robot, :gate, :start], %{latched?: latched?}}, :tick]}
   end
 
-  @impl Robot.Role
+  @impl Role
   def handle(:tick, at_ms, s, _board), do: step(s, at_ms)
 
   def handle({:cast, {:wish, twist}}, at_ms, s, _board),
     do: {%{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}, []}
 
   def handle({:cast, {:forget, then}}, at_ms, s, _board) do
-    if HardenedServer.then?(then) do
+    if Role.then?(then) do
       {reflex, urgency} = Reflex.forget(s.reflex)
       {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
       {s, effects ++ applied(then)}
@@ -150,7 +150,7 @@ defmodule Robot.Safety.Gate do
   end
 
   def handle({:cast, {:latch, then}}, at_ms, s, _board) do
-    if HardenedServer.then?(then) do
+    if Role.then?(then) do
       {s, effects} = if Reflex.latched?(s.reflex), do: {s, []}, else: latched(s, at_ms)
       {s, effects ++ applied(then)}
     else

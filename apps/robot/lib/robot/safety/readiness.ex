@@ -13,10 +13,14 @@ defmodule Robot.Safety.Readiness do
   @type health :: :online | {:offline, reason :: term()} | nil
 
   @doc "Judges a robot of this node by its config and its board (`judge/2`)."
-  @spec of(Robot.Config.t(), Board.t()) :: :ok | {:error, line :: String.t()}
-  def of(%Robot.Config{dry_run: true}, _board), do: :ok
+  @spec of(
+          %{:dry_run => boolean(), :drive => term(), optional(atom()) => term()},
+          Board.t() | Board.entries()
+        ) ::
+          :ok | {:error, line :: String.t()}
+  def of(%{dry_run: true}, _board), do: :ok
 
-  def of(%Robot.Config{drive: drive}, board) do
+  def of(%{dry_run: false, drive: drive}, board) do
     case entry(board, {:health, :drive}) do
       # It is told again and again; an order may turn them.
       {:offline, {:stands, :wheels}} ->

@@ -74,7 +74,7 @@ defmodule Sim.Chaos.Invariants do
     parts = Radio.parts(trial.radio, ids)
     stops = for id <- ids, into: %{}, do: {id, trial.members[id].stop}
     held = for {id, %{held: [_ | _]}} <- stops, do: id
-    missions = for id <- ids, mission = trial.members[id].runner.mission, do: {id, mission}
+    missions = for id <- ids, mission = trial.members[id].pilot.runner.mission, do: {id, mission}
     bodies = for id <- ids, do: world.robots[id]
 
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, parts)

@@ -26,7 +26,7 @@ defmodule Sim.Scenario.View do
   def phase(trial, robot) do
     case trial.members do
       %{^robot => member} ->
-        with {_module, phase} <- Runner.state(member.runner), do: phase
+        with {_module, phase} <- Runner.state(member.pilot.runner), do: phase
 
       _dead ->
         :dead

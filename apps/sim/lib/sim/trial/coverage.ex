@@ -83,7 +83,10 @@ defmodule Sim.Trial.Coverage do
   @doc "The map of the living robot that knows most; `nil` of a mission that makes none."
   @spec fullest(Trial.t()) :: MapFile.Writer.raster() | nil
   def fullest(trial) do
-    maps = for id <- Trial.living(trial), map = Runner.map(Trial.robot(trial, id).runner), do: map
+    maps =
+      for id <- Trial.living(trial),
+          map = Runner.map(Trial.robot(trial, id).pilot.runner),
+          do: map
 
     Enum.max_by(maps, &known(&1.cells), fn -> nil end)
   end

@@ -8,8 +8,8 @@ defmodule Sim.Trial.ForwardingTest do
   @cut {0, :end, {:link, :mag1, :mag3}}
 
   # Whose letters its mission has heard.
-  defp heard(%{runner: %{mission: %Missions.Flock{heard: heard}}}), do: Map.keys(heard)
-  defp heard(%{runner: %{mission: %{peers: peers}}}), do: Map.keys(peers)
+  defp heard(%{pilot: %{runner: %{mission: %Missions.Flock{heard: heard}}}}), do: Map.keys(heard)
+  defp heard(%{pilot: %{runner: %{mission: %{peers: peers}}}}), do: Map.keys(peers)
 
   defp run(mission, seconds, options \\ []) do
     all = %{robots: @fleet, landmark: :none, blobs: :direct, mission: mission, cuts: [@cut]}
@@ -36,7 +36,7 @@ defmodule Sim.Trial.ForwardingTest do
     trial = Enum.reduce(1..20, Trial.still(setup), fn _tick, trial -> Trial.step(trial) end)
 
     member = Trial.robot(trial, :mag3)
-    assert member.runner.phase == :idle
+    assert member.pilot.runner.phase == :idle
     assert Peers.view(member.receiver.peers, trial.at_ms) == @fleet
   end
 

@@ -54,7 +54,7 @@ defmodule Swarm.Comms.CommandHandler do
 
     case judge(request, config, board, receiver) do
       {:drive, order} -> drive(order, config.id, ref, asked)
-      {:mission, ways, command} -> deliver(ways, command, config.id, ref, asked)
+      {:mission, ways, command} -> deliver(ways, command, config, ref, asked)
       answer -> Nonblocking.answer(ref, answer)
     end
   end
@@ -99,8 +99,10 @@ defmodule Swarm.Comms.CommandHandler do
     :ok
   end
 
-  defp deliver(ways, command, id, ref, asked) do
-    until_ms = div(asked, 1_000) + @carry_out_ms
+  # By the robot's clock, which need not be the one of `asked`.
+  defp deliver(ways, command, %{id: id} = config, ref, asked) do
+    age_ms = div(System.monotonic_time(:microsecond) - asked, 1_000)
+    until_ms = Robot.Config.now(config) + @carry_out_ms - age_ms
     reply = {__MODULE__, :delivered, [id, command, ref]}
 
     Pilot.deliver(id, command, %Delivery{
@@ -221,22 +223,28 @@ defmodule Swarm.Comms.CommandHandler do
   defp list([name]), do: name
   defp list(names), do: Enum.join(names, ", ")
 
+  @doc "The ways of a command to the robot's mission (`Robot.Control.Delivery`), also in lockstep."
+  @spec ways(term(), %{
+          :mission => Robot.Config.module_options() | nil,
+          optional(atom()) => term()
+        }) ::
+          {:ok, [Delivery.way()]} | {:error, line :: String.t()}
   # What people asked of a mission survives a stop of it.
-  defp ways(:start, config), do: ways({:start, []}, config)
+  def ways(:start, config), do: ways({:start, []}, config)
 
-  defp ways({:start, []}, config) do
+  def ways({:start, []}, config) do
     with {:ok, anew} <- begin([], config),
          do: {:ok, [{:hand, {:except, Manual}}, :resume, anew]}
   end
 
-  defp ways({:start, options}, config),
+  def ways({:start, options}, config),
     do: with({:ok, anew} <- begin(options, config), do: {:ok, [anew]})
 
-  defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
-  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
+  def ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
+  def ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
 
   # A mission may name such a command as one of its own.
-  defp ways(alone, _config) do
+  def ways(alone, _config) do
     own = {:hand, {:naming, Robot.Command.name(alone)}}
     {:ok, [own, {:hand, {:only, Manual}}, {:start, Manual, []}]}
   end
@@ -251,7 +259,9 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp mission(%{mission: mission}), do: {:ok, mission}
 
-  defp command({:start, _options}), do: :start
-  defp command({:start, _module, _options}), do: :start
-  defp command(request), do: request
+  @doc "What the mission gets of a command that took one of its ways."
+  @spec command(term()) :: term()
+  def command({:start, _options}), do: :start
+  def command({:start, _module, _options}), do: :start
+  def command(request), do: request
 end

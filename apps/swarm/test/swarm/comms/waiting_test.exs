@@ -59,7 +59,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert line =~ "idle"
     assert [comms, pilot] == [Names.whereis(id, :comms), Names.whereis(id, :pilot)]
     :ok = :sys.resume(pilot)
-    assert :sys.get_state(pilot) |> elem(0) == :idle
+    assert %{state: %{state: :idle}} = :sys.get_state(pilot)
     assert Swarm.goto(id, {1, 1}) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
   end
@@ -134,7 +134,7 @@ defmodule Swarm.Comms.WaitingTest do
     pilot = Names.whereis(id, :pilot)
     :ok = :sys.suspend(pilot)
     asked = Task.async(fn -> Swarm.goto(id, {1, 1}) end)
-    waits? = &match?({:deliver, _delivery, {:command, {:goto, _, _, _}}}, &1)
+    waits? = &match?({:"$gen_cast", {:deliver, _delivery, {:command, {:goto, _, _, _}}}}, &1)
 
     eventually(fn ->
       {:messages, messages} = Process.info(pilot, :messages)
