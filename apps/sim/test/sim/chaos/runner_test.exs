@@ -2,7 +2,8 @@ defmodule Sim.Chaos.RunnerTest do
   use Sim.LockstepCase, async: true
   @moduletag :slow
   import ExUnit.CaptureLog
-  alias Sim.Chaos.{Draw, Runner, ScenarioFile, Violation}
+  alias Sim.Chaos.{Draw, Runner, ScenarioFile}
+  alias Sim.Invariants.Violation
   alias Sim.Scenario
 
   doctest Sim.Chaos.Isolated
@@ -90,7 +91,7 @@ defmodule Sim.Chaos.RunnerTest do
     assert {:ok, "chaos-1-8-collision.exs", text} = ScenarioFile.text(1, failure)
     assert {:ok, scenario} = Scenario.File.parse(text)
     assert scenario.about =~ "Run 8 of seed 1: collision at 12.3 s, mag1 mag2"
-    assert scenario.expect == [{:no_collision}]
+    assert scenario.expect == [{:never, :collision}]
 
     given = for {key, value} <- smallest, key != :script, value not in [nil, []], do: {key, value}
     # That of its runs, and not that of a file that does not say.
