@@ -23,7 +23,7 @@ defmodule Sim.Invariants do
 
   Only the first violation of each invariant by the same robots is kept.
   """
-  alias Sim.Invariants.{Leaders, Limits, Slots, Stops, Violation, Withdrawals}
+  alias Sim.Invariants.{Attempt, Leaders, Limits, Slots, Stops, Violation, Withdrawals}
   alias Sim.{Radio, Trial}
   alias Sim.Trial.{Claims, Faults, Stuck}
 
@@ -70,17 +70,16 @@ defmodule Sim.Invariants do
   """
   @spec step(t(), Trial.t()) :: {Trial.t(), t()}
   def step(judge, %Trial{} = trial) do
-    stepped = Trial.step(trial)
-    {stepped, note(judge, stepped)}
-  catch
-    # The reason with which a process would end.
-    :error, reason -> crashed(judge, trial, {reason, __STACKTRACE__})
-    :throw, value -> crashed(judge, trial, {{:nocatch, value}, __STACKTRACE__})
-    :exit, reason -> crashed(judge, trial, reason)
-  end
+    attempt = fn ->
+      stepped = Trial.step(trial)
+      {stepped, note(judge, stepped)}
+    end
 
-  defp crashed(judge, trial, reason),
-    do: {trial, tell(judge, [Violation.crash(trial.at_ms, reason)])}
+    case Attempt.call(attempt) do
+      {:ok, done} -> done
+      {:exit, reason} -> {trial, tell(judge, [Violation.crash(trial.at_ms, reason)])}
+    end
+  end
 
   @doc "One tick: the trial after a step."
   @spec note(t(), Trial.t()) :: t()

@@ -9,6 +9,7 @@ defmodule Sim.InvariantsTest do
   alias Swarm.EStop
   alias Missions.Landmark.Reference
 
+  doctest Sim.Invariants.Attempt
   doctest Sim.Invariants.Violation
   doctest Sim.Invariants.Leaders
 

@@ -1,5 +1,6 @@
 defmodule Sim.Chaos.Isolated do
   @moduledoc "Calls a function in a process of its own, so that what it raises is a finding and not the end."
+  alias Sim.Invariants.Attempt
   alias Sim.Trial.Memory
 
   @doc """
@@ -15,11 +16,11 @@ defmodule Sim.Chaos.Isolated do
     {pid, monitor} =
       spawn_monitor(fn ->
         Memory.prepare()
-        exit({:chaos_value, function.()})
+        exit({:chaos_value, Attempt.call(function)})
       end)
 
     receive do
-      {:DOWN, ^monitor, :process, ^pid, {:chaos_value, value}} -> {:ok, value}
+      {:DOWN, ^monitor, :process, ^pid, {:chaos_value, result}} -> result
       {:DOWN, ^monitor, :process, ^pid, reason} -> {:exit, reason}
     end
   end
