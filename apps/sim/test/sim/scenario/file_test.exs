@@ -158,6 +158,7 @@ defmodule Sim.Scenario.FileTest do
               formation: {:wedge, 1.25},
               lost_link: :hold,
               moves: [{{1, 2.0}, 3}],
+              kills: Enum.random([[leader: 9], [leader: 9, leader: 30]]),
               cuts: [{1, :end, [[robot], []]}]
             ],
             3
