@@ -9,7 +9,7 @@
   expect: [
     {:formed, by_s: 120},
     {:in_slot, :all, within_m: 0.5, by_s: 120},
-    {:no_collision},
-    {:claims_true}
+    {:never, :collision},
+    {:never, :false_claim}
   ]
 ]

@@ -9,6 +9,6 @@
     {:formed, by_s: 35},
     {:formed_again, after_s: 36, within_s: 60},
     {:at_most_one_leader, grace_s: 2},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -9,6 +9,6 @@
     {:formed, by_s: 35},
     {:formed_again, after_s: 46, within_s: 60},
     {:agreed, by_s: 70, after_s: 45},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

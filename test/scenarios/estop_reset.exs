@@ -13,6 +13,6 @@
     {:still, :all, from_s: 18, to_s: 32},
     {:phase, :all, :idle, by_s: 18, after_s: 16},
     {:formed, by_s: 100, after_s: 32},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

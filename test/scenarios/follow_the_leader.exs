@@ -14,6 +14,6 @@
     {:moves, :mag2, by_s: 30},
     {:phase, :mag2, :follow_the_leader, by_s: 5},
     {:at, :mag2, {-4, -3}, within_m: 1.5, by_s: 60},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

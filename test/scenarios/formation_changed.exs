@@ -10,7 +10,7 @@
     {:moves, :mag2, by_s: 45, after_s: 35},
     {:formed_again, after_s: 36, within_s: 60},
     {:in_slot, :all, within_m: 0.5, by_s: 80, after_s: 45},
-    {:slots_unique},
-    {:no_collision}
+    {:never, :bad_anchor},
+    {:never, :collision}
   ]
 ]

@@ -7,8 +7,8 @@
   expect: [
     {:formed, by_s: 100},
     {:in_slot, :all, within_m: 0.5, by_s: 100},
-    {:slots_unique},
-    {:claims_true},
-    {:no_collision}
+    {:never, :bad_anchor},
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

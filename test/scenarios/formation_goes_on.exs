@@ -10,8 +10,8 @@
     {:formed, by_s: 35},
     {:same_leader, from_s: 34},
     {:formed_again, after_s: 35, within_s: 40},
-    {:slots_unique},
-    {:claims_true},
-    {:no_collision}
+    {:never, :bad_anchor},
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

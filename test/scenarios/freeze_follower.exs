@@ -9,7 +9,7 @@
     {:still, :mag1, from_s: 14, to_s: 20},
     {:moves, :mag1, by_s: 60, after_s: 20},
     {:formed, by_s: 90, after_s: 20},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

@@ -13,6 +13,6 @@
     {:one_leader, after_s: 60, to_s: 65},
     {:formed_again, after_s: 43, within_s: 60},
     {:at_most_one_leader, grace_s: 2},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

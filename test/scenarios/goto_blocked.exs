@@ -17,6 +17,6 @@
     {:phase, :mag1, :given_up, by_s: 45},
     {:still, :mag1, from_s: 50, to_s: 59},
     {:at, :mag1, {7, 2}, within_m: 0.4, by_s: 75},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -16,6 +16,6 @@
   expect: [
     {:at, :mag1, {6, 1}, within_m: 0.6, by_s: 90},
     {:at, :mag2, {-2, 0}, within_m: 0.6, by_s: 90},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -14,6 +14,6 @@
   expect: [
     {:at, :mag1, {10.7, 11.5}, within_m: 0.4, by_s: 70},
     {:at, :min1, {-10.7, -11.5}, within_m: 0.4, by_s: 70},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

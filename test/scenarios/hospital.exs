@@ -10,7 +10,7 @@
   expect: [
     {:formed, by_s: 50},
     {:formed_again, after_s: 50, within_s: 90},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

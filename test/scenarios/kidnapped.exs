@@ -10,7 +10,7 @@
     {:formed, by_s: 40},
     {:says, :mag1, :unsure, by_s: 52, after_s: 41},
     {:not_formed, from_s: 52, to_s: 67},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

@@ -13,6 +13,6 @@
     {:leader, by_s: 10},
     {:formed_again, after_s: 41, within_s: 60},
     {:agreed, by_s: 100, after_s: 42},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -9,7 +9,7 @@
     {:leader_changed, after_s: 35, within_s: 15},
     {:formed_again, after_s: 35, within_s: 40},
     {:one_leader, after_s: 50, to_s: 60},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

@@ -9,6 +9,6 @@
   expect: [
     {:formed, by_s: 35},
     {:rest, by_s: 200},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

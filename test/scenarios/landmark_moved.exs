@@ -10,8 +10,8 @@
     {:formed, by_s: 40},
     {:formed_again, after_s: 41, within_s: 60},
     {:in_slot, :all, within_m: 0.5, by_s: 100, after_s: 55},
-    {:claims_true},
-    {:no_collision},
-    {:never_stuck}
+    {:never, :false_claim},
+    {:never, :collision},
+    {:never, :stuck}
   ]
 ]

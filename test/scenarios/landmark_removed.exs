@@ -9,6 +9,6 @@
   expect: [
     {:formed, by_s: 35},
     {:formed_again, after_s: 50, within_s: 80},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

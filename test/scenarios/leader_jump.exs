@@ -10,7 +10,7 @@
     {:formed, by_s: 40},
     {:moves, :mag2, by_s: 45, after_s: 41},
     {:in_slot, :all, within_m: 0.3, by_s: 70, after_s: 46},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

@@ -11,7 +11,7 @@
     {:formed, by_s: 35},
     {:same_leader, from_s: 34},
     {:formed_again, after_s: 36, within_s: 60},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

@@ -8,7 +8,7 @@
   expect: [
     {:formed, by_s: 80},
     {:at_most_one_leader, grace_s: 2},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

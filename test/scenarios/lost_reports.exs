@@ -10,6 +10,6 @@
   expect: [
     {:agreed, by_s: 40, after_s: 12},
     {:formed, by_s: 80},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -8,6 +8,6 @@
     {:rest, by_s: 115},
     {:not_formed},
     {:never_phase, :all, :lead},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -7,6 +7,6 @@
   expect: [
     {:formed, by_s: 90},
     {:agreed, by_s: 40},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

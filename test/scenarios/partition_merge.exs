@@ -13,6 +13,6 @@
     {:one_leader, after_s: 75, to_s: 85},
     {:agreed, by_s: 80, after_s: 61},
     {:formed_again, after_s: 60, within_s: 70},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

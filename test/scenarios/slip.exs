@@ -6,8 +6,8 @@
   duration_s: 120,
   expect: [
     {:formed, by_s: 110},
-    {:claims_true},
-    {:never_stuck},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :stuck},
+    {:never, :collision}
   ]
 ]

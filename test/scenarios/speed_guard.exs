@@ -14,6 +14,6 @@
     {:moves, :mag1, by_s: 3},
     {:speed_at_most, 0.5},
     {:still, :mag1, from_s: 8, to_s: 12},
-    {:no_collision}
+    {:never, :collision}
   ]
 ]

@@ -6,7 +6,7 @@
   duration_s: 110,
   expect: [
     {:formed, by_s: 100},
-    {:claims_true},
-    {:no_collision}
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

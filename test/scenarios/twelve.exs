@@ -8,8 +8,8 @@
   expect: [
     {:leader, by_s: 30},
     {:formed, by_s: 110},
-    {:slots_unique},
-    {:claims_true},
-    {:no_collision}
+    {:never, :bad_anchor},
+    {:never, :false_claim},
+    {:never, :collision}
   ]
 ]

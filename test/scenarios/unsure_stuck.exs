@@ -19,6 +19,6 @@
   leader_change: true,
   policy: :available,
   expect: [
-    {:never_stuck}
+    {:never, :stuck}
   ]
 ]

@@ -4,7 +4,9 @@ defmodule Console.ChaosTest do
   import ExUnit.CaptureIO
   alias Console.Chaos
   alias Console.Chaos.{Options, Report}
-  alias Sim.Chaos.Violation
+  alias Console.Scenario
+  alias Console.Scenario.Session
+  alias Sim.Invariants.Violation
 
   doctest Console.Chaos.Options
   doctest Console.Cli.Progress
@@ -15,9 +17,21 @@ defmodule Console.ChaosTest do
   defp draw(seed, _number),
     do: [robots: [:mag1, :mag2], seed: seed, blobs: :direct, duration_s: 2]
 
-  defp chaos(line, words \\ []) do
+  defp chaos(line, words \\ [], draw \\ &draw/2) do
     {:ok, options} = Options.parse(OptionParser.split(line) ++ words)
-    with_io(fn -> Chaos.run(options, draw: &draw/2) end)
+    with_io(fn -> Chaos.run(options, draw: draw) end)
+  end
+
+  defmodule Raising do
+    @moduledoc "A mission that raises after a second."
+    @behaviour Robot.Mission
+
+    @impl Robot.Mission
+    def init(robot, _options), do: {:idle, robot, []}
+
+    @impl Robot.Mission
+    def handle({:tick, %{at_ms: at_ms}}, _robot) when at_ms >= 1_000, do: raise("out of order")
+    def handle(_event, robot), do: {:search, robot, []}
   end
 
   test "every option is understood" do
@@ -69,6 +83,49 @@ defmodule Console.ChaosTest do
     assert File.read!(json) =~ ~s("clean":false)
     assert File.read!(json) =~ ~s("runs":3)
   end
+
+  # In one run somebody puts a robot in the way of another one, which cannot brake so soon; the next one raises.
+  defp wrong(_seed, 1) do
+    [
+      robots: [:mag1, :mag2, :min1],
+      landmark: :none,
+      blobs: :direct,
+      duration_s: 12,
+      script: [
+        {0, {:displace, :mag1, {-3, 0, 0}}},
+        {0, {:tell, :mag1, "move:0.5:0"}},
+        {4, {:displace, :mag2, {-0.8, 0, 0}}}
+      ]
+    ]
+  end
+
+  defp wrong(_seed, 2),
+    do: [robots: [:mag1, :min1], blobs: :direct, duration_s: 5, mission: Raising]
+
+  @tag :tmp_dir
+  test "what is kept fails in mix scenario, in the same words, and its recording ends there", %{
+    tmp_dir: folder
+  } do
+    assert {2, text} = chaos("--runs 2 --attempts 8", ["--keep", folder], &wrong/2)
+    files = Path.wildcard(Path.join(folder, "*.exs"))
+
+    assert [{1, "collision"}, {2, "crash"}] =
+             for({file, n} <- Enum.with_index(files, 1), do: {n, invariant(file)})
+
+    for file <- files do
+      {2, told} = with_io(fn -> Session.run(%Scenario.Options{files: [file], record: nil}) end)
+
+      assert [_all, words] = Regex.run(~r/FAILED  \{:never, :#{invariant(file)}\}: (.+)\n/, told)
+      assert text =~ ~r/: #{invariant(file)} at \d/
+      # What the run was when it was smallest.
+      assert told =~ "Shrunk: #{words}."
+      recording = Path.rootname(file) <> ".mcap"
+      assert {:ok, asked} = Console.Replay.Options.parse([recording, "--at", "0.5"])
+      assert {0, _replayed} = with_io(fn -> Console.Replay.run(asked) end)
+    end
+  end
+
+  defp invariant(file), do: file |> Path.basename(".exs") |> String.split("-") |> List.last()
 
   test "a file that cannot be written ends with 1 before anything is played" do
     error =

@@ -17,15 +17,15 @@ defmodule Console.ScenarioTest do
   defp session(files, quiet? \\ false),
     do: with_io(fn -> Session.run(%Options{files: files, quiet: quiet?}) end)
 
-  @holds "[robots: 1, duration_s: 1, expect: [{:no_collision}, {:phase, :mag1, :search, by_s: 1}]]"
-  @fails "[about: \"Too early.\", robots: 1, duration_s: 1, expect: [{:no_collision}, {:formed, by_s: 0.5}]]"
+  @holds "[robots: 1, duration_s: 1, expect: [{:never, :collision}, {:phase, :mag1, :search, by_s: 1}]]"
+  @fails "[about: \"Too early.\", robots: 1, duration_s: 1, expect: [{:never, :collision}, {:formed, by_s: 0.5}]]"
 
   test "a scenario that holds ends with 0, and prints stages and expectations", %{tmp_dir: folder} do
     {status, text} = session([file(folder, "a.exs", @holds)])
     assert status == 0
     assert text =~ "1 robot (mag1) in hall, seed 1"
     assert text =~ ~r/ 0\.0 s  search /
-    assert text =~ ~r/ 1\.0 s  held    \{:no_collision\}: to the end of the run/
+    assert text =~ ~r/ 1\.0 s  held    \{:never, :collision\}: to the end of the run/
     assert text =~ "a.exs: 2 expectations held, after 1.0 s"
     refute text =~ "\e["
   end

@@ -67,6 +67,10 @@ defmodule Robot.Board do
 
   @again_ms 1_000
   @peers [{{{:peer, :"$1"}, :"$2", :_}, [], [{{:"$1", :"$2"}}]}]
+  @own [
+    {{:"$1", :_, :_}, [{:not, {:is_tuple, :"$1"}}], [:"$_"]},
+    {{{:"$1", :_}, :_, :_}, [{:"=/=", :"$1", :peer}], [:"$_"]}
+  ]
 
   @enforce_keys [:robot, :table, :latch, :clock, :since_ms]
   defstruct @enforce_keys
@@ -229,12 +233,12 @@ defmodule Robot.Board do
   def peers(%__MODULE__{table: table}),
     do: Map.new(unless_ended([], fn -> :ets.select(table, @peers) end))
 
-  @doc "All entries with their ages, for people."
+  @doc "All entries of the robot itself with their ages, for people; `peers/1` has those of others, which are many."
   @spec entries(t()) :: %{(key :: term()) => {value :: term(), age_ms :: integer()}}
   def entries(%__MODULE__{table: table} = board) do
     now_ms = now(board)
-    all = unless_ended([], fn -> :ets.tab2list(table) end)
-    Map.new(all, fn {key, value, at_ms} -> {key, {value, now_ms - at_ms}} end)
+    own = unless_ended([], fn -> :ets.select(table, @own) end)
+    Map.new(own, fn {key, value, at_ms} -> {key, {value, now_ms - at_ms}} end)
   end
 
   @doc "Whether the e-stop is latched; a robot whose board has ended is held."

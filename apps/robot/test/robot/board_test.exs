@@ -48,6 +48,20 @@ defmodule Robot.BoardTest do
     assert age_ms in 0..1_000
   end
 
+  test "a status reads what the robot says of itself, and copies no peers" do
+    board = board(:board_entries)
+    own = [:pose, {:health, :drive}, {:hung, :gate}, {:crashed, :pilot}]
+
+    for {key, writer} <- Enum.zip(own, [:executive, :drive, :watch, :pilot]),
+        do: Board.put(board, writer, key, key, 1_000)
+
+    before = Board.entries(board)
+    assert Enum.sort(Map.keys(before)) == Enum.sort(own)
+    for id <- [:mag2, :min1], do: Board.put(board, :comms, {:peer, id}, %{id: id}, 1_000)
+    assert Map.keys(Board.entries(board)) == Map.keys(before)
+    assert Board.peers(board) == %{mag2: %{id: :mag2}, min1: %{id: :min1}}
+  end
+
   @tag :capture_log
   test "one that has ended is empty, and holds its robot, for whoever found it a moment before" do
     board = board(:board_ended)

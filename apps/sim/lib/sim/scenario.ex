@@ -30,9 +30,9 @@ defmodule Sim.Scenario do
   A scenario of `about:` (a text), `options:` (of `Sim.Trial.Options`; `robots:` may be a number),
   `script:` and `expect:`; none must be given. The error is one line.
 
-      iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 2, seed: 3], script: [{5, {:kill, :leader}}], expect: [:no_collision])
+      iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 2, seed: 3], script: [{5, {:kill, :leader}}], expect: [{:never, :collision}])
       iex> {scenario.options, scenario.script, scenario.expect}
-      {[robots: [:mag1, :min1], seed: 3], [{5.0, {:kill, :leader}}], [{:no_collision}]}
+      {[robots: [:mag1, :min1], seed: 3], [{5.0, {:kill, :leader}}], [{:never, :collision}]}
       iex> Sim.Scenario.new(options: [robots: 2], script: [{500, {:reset}}])
       {:error, "scenario option script.1: expected times within the run, got {500.0, {:reset}}: the run ends after 120 s"}
       iex> Sim.Scenario.new(expect: [{:formd, by_s: 60}])

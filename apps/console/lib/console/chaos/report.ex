@@ -1,7 +1,9 @@
 defmodule Console.Chaos.Report do
   @moduledoc "Writes what `mix chaos` prints and writes of its runs. Pure."
   alias Console.Cli.Format
-  alias Sim.Chaos.{Invariants, Runner, Violation}
+  alias Sim.Chaos.Runner
+  alias Sim.Invariants
+  alias Sim.Invariants.Violation
 
   @doc "The line of a failure: the run, what was wrong, and the command that plays it again."
   @spec failure(integer(), Runner.failure()) :: String.t()

@@ -17,9 +17,13 @@ defmodule Console.Scenario.Recording do
 
   defp play(run, recorder) do
     unless Runner.done?(run) do
+      before_ms = run.trial.at_ms
       run = Runner.step(run)
       {entries, trial} = Trial.take_entries(run.trial)
-      :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial))
+      # A step that raised was none.
+      if trial.at_ms > before_ms,
+        do: :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial))
+
       play(%{run | trial: trial}, recorder)
     end
   end

@@ -1,7 +1,7 @@
 defmodule Sim.Chaos.Run do
   @moduledoc "Plays one run of `mix chaos` from its options to its violations. Pure."
-  alias Sim.Chaos.{Invariants, Violation}
-  alias Sim.Trial
+  alias Sim.{Invariants, Trial}
+  alias Sim.Invariants.Violation
 
   @typedoc """
   What became of a run: its violations, and figures for the table. `claims` counts those that can be
@@ -38,23 +38,26 @@ defmodule Sim.Chaos.Run do
   @spec first(keyword(), atom()) :: Violation.t() | nil
   def first(options, invariant) do
     case Trial.new(Map.new(options)) do
-      {:ok, trial} ->
-        done? = &Invariants.violated?(&1, invariant)
-        {trial, judge} = go_on(trial, Invariants.new(trial), done?)
-        judge = if done?.(judge), do: judge, else: Invariants.finish(judge, Trial.result(trial))
-        Enum.find(Invariants.violations(judge), &(&1.invariant == invariant))
-
-      {:error, _line} ->
-        nil
+      {:ok, trial} -> first_of(trial, invariant)
+      {:error, _line} -> nil
     end
   end
 
+  @doc "The same of a run that was set up."
+  @spec first_of(Trial.t(), atom()) :: Violation.t() | nil
+  def first_of(%Trial{} = trial, invariant) do
+    done? = &Invariants.violated?(&1, invariant)
+    {trial, judge} = go_on(trial, Invariants.new(trial), done?)
+    judge = if done?.(judge), do: judge, else: Invariants.finish(judge, Trial.result(trial))
+    Invariants.first(judge, invariant)
+  end
+
   defp go_on(trial, judge, enough?) do
-    if Trial.done?(trial) or enough?.(judge) do
+    if Trial.done?(trial) or Invariants.violated?(judge, :crash) or enough?.(judge) do
       {trial, judge}
     else
-      trial = Trial.step(trial)
-      go_on(trial, Invariants.note(judge, trial), enough?)
+      {trial, judge} = Invariants.step(judge, trial)
+      go_on(trial, judge, enough?)
     end
   end
 

@@ -3,7 +3,9 @@ defmodule Sim.Chaos.Runner do
   Plays many runs side by side, and shrinks each violation. The result does not depend on how many
   are played at once.
   """
-  alias Sim.Chaos.{Draw, Invariants, Isolated, Run, Shrink, Violation}
+  alias Sim.Chaos.{Draw, Isolated, Run, Shrink}
+  alias Sim.Invariants
+  alias Sim.Invariants.Violation
 
   # A run that violates many invariants mostly has one cause.
   @most_shrunk 2
@@ -58,7 +60,7 @@ defmodule Sim.Chaos.Runner do
 
   @doc """
   Whether runs are clean together: no violation, but for false claims, of which the goal of
-  `Sim.Chaos.Invariants.goal/0` allows some among many.
+  `Sim.Invariants.goal/0` allows some among many.
   """
   @spec clean?([played()]) :: boolean()
   def clean?(runs) do
@@ -97,7 +99,7 @@ defmodule Sim.Chaos.Runner do
     case Isolated.call(fn -> Run.play(run) end) do
       {:ok, {:ok, outcome}} -> {outcome, outcome.violations}
       {:ok, {:error, line}} -> {nil, [Violation.new(:crash, 0, [], "not a run: " <> line)]}
-      {:exit, line} -> {nil, [Violation.new(:crash, 0, [], line)]}
+      {:exit, reason} -> {nil, [Violation.crash(0, reason)]}
     end
   end
 
@@ -117,18 +119,11 @@ defmodule Sim.Chaos.Runner do
     }
   end
 
-  # When a run raised is not known, so its time is not shortened.
-  defp again(run, :crash) do
-    case Isolated.call(fn -> Run.play(run) end) do
-      {:exit, line} -> Violation.new(:crash, run[:duration_s] * 1000, [], line)
-      {:ok, _no_crash} -> nil
-    end
-  end
-
+  # A run that cannot even be set up raises outside its steps.
   defp again(run, invariant) do
     case Isolated.call(fn -> Run.first(run, invariant) end) do
       {:ok, violation} -> violation
-      {:exit, _another_fault} -> nil
+      {:exit, reason} -> if invariant == :crash, do: Violation.crash(0, reason)
     end
   end
 end

@@ -10,8 +10,12 @@ defmodule Sim.Scenario.Check do
 
   An expectation is of one of two kinds. What must come about (`:reach`) holds as soon as it does, and
   fails when its time is up. What must be so all the time (`:keep`) fails as soon as it is not, and
-  holds when its time is up, or the run. `Sim.Scenario.Check.Fleet` and `.Bodies` know which.
+  holds when its time is up, or the run. `Sim.Scenario.Check.Fleet` and `.Bodies` know which. What is
+  never to be (`{:never, invariant}`) is judged by `Sim.Invariants`, as in `mix chaos`; what that can say
+  at the end of a run alone is asked in `finish/3`.
   """
+  alias Sim.Invariants
+  alias Sim.Invariants.Violation
   alias Sim.Scenario.{Expectation, View}
   alias Sim.Scenario.Check.{Bodies, Fleet}
   alias Sim.Trial
@@ -38,18 +42,21 @@ defmodule Sim.Scenario.Check do
   @type answer :: {:reach | :keep, so? :: boolean(), figures :: String.t(), memory :: term()}
 
   @bodies [:at, :in_slot, :still, :moves, :turned, :sees_distance] ++
-            [:speed_at_most, :separation_at_least, :no_collision]
+            [:speed_at_most, :separation_at_least]
 
   @doc "The check of an expectation, before the first tick."
   @spec new(Expectation.t()) :: t()
   def new(expectation),
     do: %__MODULE__{expectation: expectation, window: Expectation.window(expectation)}
 
-  @doc "One tick of 100 ms. What is decided stays."
-  @spec tick(t(), Trial.t()) :: t()
-  def tick(%__MODULE__{status: {_decided, _at_s, _figures}} = check, _trial), do: check
+  @doc "One tick of 100 ms, and what the judge of the run has seen up to now. What is decided stays."
+  @spec tick(t(), Trial.t(), Invariants.t()) :: t()
+  def tick(%__MODULE__{status: {_decided, _at_s, _figures}} = check, _trial, _judge), do: check
 
-  def tick(%__MODULE__{window: {from_s, to_s}, expectation: expectation} = check, trial) do
+  def tick(%__MODULE__{expectation: {:never, _invariant}} = check, _trial, judge),
+    do: never(check, judge)
+
+  def tick(%__MODULE__{window: {from_s, to_s}, expectation: expectation} = check, trial, _judge) do
     at_s = View.at_s(trial)
 
     if at_s < from_s do
@@ -62,6 +69,13 @@ defmodule Sim.Scenario.Check do
     end
   end
 
+  defp never(%{expectation: {:never, invariant}} = check, judge) do
+    case Invariants.first(judge, invariant) do
+      nil -> %{check | status: :holding}
+      one -> %{check | status: {:failed, one.at_ms / 1000, Violation.line(one)}}
+    end
+  end
+
   defp status(:reach, true, _over?, at_s, figures), do: {:held, at_s, figures}
   defp status(:reach, false, true, at_s, figures), do: {:failed, at_s, figures}
   defp status(:reach, false, false, _at_s, _figures), do: :open
@@ -69,9 +83,18 @@ defmodule Sim.Scenario.Check do
   defp status(:keep, true, true, at_s, figures), do: {:held, at_s, figures}
   defp status(:keep, true, false, _at_s, _figures), do: :holding
 
-  @doc "The end of the run: what was not violated holds, what did not come about fails."
-  @spec finish(t(), Trial.t()) :: t()
-  def finish(check, trial) do
+  @doc """
+  The end of the run, and of its judge (`Sim.Invariants.finish/2`): what was not violated holds, what did
+  not come about fails.
+  """
+  @spec finish(t(), Trial.t(), Invariants.t()) :: t()
+  def finish(%{expectation: {:never, _invariant}, status: status} = check, trial, judge)
+      when status in [:open, :holding],
+      do: check |> never(judge) |> ended(trial)
+
+  def finish(check, trial, _judge), do: ended(check, trial)
+
+  defp ended(check, trial) do
     at_s = View.at_s(trial)
 
     case check.status do

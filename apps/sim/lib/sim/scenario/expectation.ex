@@ -26,10 +26,7 @@ defmodule Sim.Scenario.Expectation do
   | `{:sees_distance, robot, within_percent: p}` | its measure of the distance to the landmark is never further off, and it has one |
   | `{:speed_at_most, m_s}` | no robot is ever faster |
   | `{:separation_at_least, m}` | no two robots come closer, edge to edge |
-  | `{:no_collision}` | no robot touches a wall or another robot |
-  | `{:claims_true}` | whenever the leader claims that the fleet is formed, it is (`Sim.Trial.Claims`) |
-  | `{:never_stuck}` | no follower makes no progress without saying so (`Sim.Trial.Stuck`) |
-  | `{:slots_unique}` | no leader gives one slot to two robots, or two slots to one |
+  | `{:never, invariant}` | this invariant is never violated (`Sim.Invariants`), judged as in `mix chaos` |
 
   `who` is a robot or `:all`. Those with `by_s` also take `after_s` (0): what was before does not
   count. Those about the whole run take `from_s` (0) and `to_s` (its end).
@@ -125,10 +122,7 @@ defmodule Sim.Scenario.Expectation do
        [{:within_percent, required({:number, 0, 1000, "percent"})} | always]},
       {:speed_at_most, [m_s: {:number, 0, 100, "m/s"}], always},
       {:separation_at_least, [metres: {:number, 0, 1000, "m"}], []},
-      {:no_collision, [], []},
-      {:claims_true, [], []},
-      {:never_stuck, [], []},
-      {:slots_unique, [], always}
+      {:never, [invariant: {:one_of, Sim.Invariants.names()}], []}
     ]
   end
 
@@ -144,7 +138,7 @@ defmodule Sim.Scenario.Expectation do
 
       iex> Sim.Scenario.Expectation.options({:formed, [by_s: 60.0]})
       [by_s: 60.0]
-      iex> Sim.Scenario.Expectation.options({:no_collision})
+      iex> Sim.Scenario.Expectation.options({:never, :collision})
       []
   """
   @spec options(t()) :: keyword()
@@ -167,7 +161,7 @@ defmodule Sim.Scenario.Expectation do
 
       iex> Sim.Scenario.Expectation.window({:formed_again, [after_s: 40.0, within_s: 30.0]})
       {40.0, 70.0}
-      iex> Sim.Scenario.Expectation.window({:no_collision})
+      iex> Sim.Scenario.Expectation.window({:never, :collision})
       {0, :end}
   """
   @spec window(t()) :: {from_s :: number(), to_s :: number() | :end}

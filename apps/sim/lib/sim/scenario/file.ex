@@ -16,7 +16,7 @@ defmodule Sim.Scenario.File do
   once each key by itself is right.
   """
   alias Robot.File.{Reader, Terms}
-  alias Sim.Scenario
+  alias Sim.{Invariants, Scenario}
   alias Sim.Scenario.{Expectation, Names, Text}
 
   @doc """
@@ -47,7 +47,7 @@ defmodule Sim.Scenario.File do
   defp read(text, name, more) do
     # Loads the modules whose names a file may use, which are found among existing atoms only.
     table = Scenario.table()
-    _names = {Names.all(), Expectation.phases(), Swarm.Formation.kinds()}
+    _names = {Names.all(), Expectation.phases(), Invariants.names(), Swarm.Formation.kinds()}
 
     with {:ok, {_line, value} = tree} <- Reader.read(text, "scenario"),
          :ok <- keys(value),

@@ -4,14 +4,20 @@ defmodule Sim.Scenario.Runner do
 
   A run ends when all expectations are decided, when those that are left concern the whole run, have been judged for 5 s
   and the fleet is calm (`Sim.Trial.done?/1`), or when its time is up. One that ends at a time keeps it alive until then.
+  A run that raises does so here, too, but where a scenario expects that it does not: then it ends.
   """
-  alias Sim.{Scenario, Trial}
+  alias Sim.{Invariants, Scenario, Trial}
   alias Sim.Scenario.{Check, Expectation, View}
 
-  @enforce_keys [:scenario, :trial, :checks]
+  @enforce_keys [:scenario, :trial, :judge, :checks]
   defstruct @enforce_keys
 
-  @type t :: %__MODULE__{scenario: Scenario.t(), trial: Trial.t(), checks: [Check.t()]}
+  @type t :: %__MODULE__{
+          scenario: Scenario.t(),
+          trial: Trial.t(),
+          judge: Invariants.t(),
+          checks: [Check.t()]
+        }
 
   @typedoc "Whether an expectation held, when that was decided, and the figures."
   @type verdict :: %{
@@ -31,14 +37,30 @@ defmodule Sim.Scenario.Runner do
   @spec begin(Scenario.t(), Trial.t()) :: t()
   def begin(%Scenario{} = scenario, trial) do
     checks = Enum.map(scenario.expect, &Check.new/1)
-    %__MODULE__{scenario: scenario, trial: trial, checks: checks}
+
+    %__MODULE__{
+      scenario: scenario,
+      trial: trial,
+      judge: Invariants.new(trial),
+      checks: checks
+    }
   end
 
   @doc "Advances the run by 100 ms."
   @spec step(t()) :: t()
   def step(%__MODULE__{} = run) do
-    trial = Trial.step(run.trial)
-    %{run | trial: trial, checks: Enum.map(run.checks, &Check.tick(&1, trial))}
+    {trial, judge} = advance(run)
+    checks = Enum.map(run.checks, &Check.tick(&1, trial, judge))
+    %{run | trial: trial, judge: judge, checks: checks}
+  end
+
+  defp advance(%{scenario: %{expect: expect}, judge: judge, trial: trial}) do
+    if {:never, :crash} in expect do
+      Invariants.step(judge, trial)
+    else
+      trial = Trial.step(trial)
+      {trial, Invariants.note(judge, trial)}
+    end
   end
 
   # As long as a fleet has to be calm.
@@ -52,6 +74,7 @@ defmodule Sim.Scenario.Runner do
 
     cond do
       at_s >= Scenario.duration_s(run.scenario) -> true
+      Invariants.violated?(run.judge, :crash) -> true
       checks != [] and left == [] -> true
       Enum.any?(left, &wanted?(&1, at_s)) -> false
       true -> Trial.done?(trial)
@@ -64,9 +87,11 @@ defmodule Sim.Scenario.Runner do
 
   @doc "The verdicts if the run ended now, in the order of the expectations."
   @spec verdicts(t()) :: [verdict()]
-  def verdicts(%__MODULE__{trial: trial, checks: checks}) do
+  def verdicts(%__MODULE__{trial: trial, checks: checks} = run) do
+    judge = Invariants.finish(run.judge, Trial.result(trial))
+
     for check <- checks do
-      %Check{status: {word, at_s, figures}} = Check.finish(check, trial)
+      %Check{status: {word, at_s, figures}} = Check.finish(check, trial, judge)
       %{expectation: check.expectation, held?: word == :held, at_s: at_s, figures: figures}
     end
   end
@@ -74,7 +99,7 @@ defmodule Sim.Scenario.Runner do
   @doc """
   A whole run: the report (`Sim.Trial.result/1`) and the verdicts.
 
-      iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 1, duration_s: 1], expect: [:no_collision, {:formed, by_s: 0.5}])
+      iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 1, duration_s: 1], expect: [{:never, :collision}, {:formed, by_s: 0.5}])
       iex> {:ok, result, [safe, formed]} = Sim.Scenario.Runner.run(scenario)
       iex> {result.simulated_s, safe.held?, formed.held?, formed.at_s, formed.figures}
       {1.0, true, false, 0.5, "not in formation: nobody leads; mag1 search"}

@@ -12,10 +12,13 @@ defmodule Sim.Scenario.Text do
   def form(value), do: value(value, &number/1)
 
   @doc """
-  An option's value, with its numbers as they are.
+  An option's value, with its numbers as they are. What looks like keys is written so unless one stands there twice, which
+  no file may say.
 
       iex> Sim.Scenario.Text.option([{{3.0, 2}, 40}])
       "[{{3.0, 2}, 40}]"
+      iex> for kills <- [[mag1: 9, leader: 30], [leader: 9, leader: 30]], do: Sim.Scenario.Text.option(kills)
+      ["[mag1: 9, leader: 30]", "[{:leader, 9}, {:leader, 30}]"]
   """
   @spec option(term()) :: String.t()
   def option(value), do: value(value, &inspect/1)
@@ -26,7 +29,7 @@ defmodule Sim.Scenario.Text do
     {values, keys} =
       case tuple |> Tuple.to_list() |> Enum.split(-1) do
         {values, [[_ | _] = last]} ->
-          if Keyword.keyword?(last), do: {values, last}, else: {values ++ [last], []}
+          if keys?(last), do: {values, last}, else: {values ++ [last], []}
 
         {values, last} ->
           {values ++ last, []}
@@ -36,7 +39,7 @@ defmodule Sim.Scenario.Text do
   end
 
   defp value([_ | _] = list, show) do
-    if Keyword.keyword?(list),
+    if keys?(list),
       do: "[" <> Enum.join(keys(list, show), ", ") <> "]",
       else: "[" <> Enum.map_join(list, ", ", &value(&1, show)) <> "]"
   end
@@ -45,6 +48,10 @@ defmodule Sim.Scenario.Text do
     do: inspect(text, printable_limit: :infinity, limit: :infinity)
 
   defp value(other, _show), do: inspect(other)
+
+  defp keys?(list) do
+    Keyword.keyword?(list) and Keyword.keys(list) == Enum.uniq(Keyword.keys(list))
+  end
 
   # The reader tells `{a, [{:b, 1}]}` from keys by how they are written, and takes both.
   defp keys(keys, show), do: for({key, value} <- keys, do: "#{key}: #{value(value, show)}")

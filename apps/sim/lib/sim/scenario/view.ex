@@ -71,11 +71,4 @@ defmodule Sim.Scenario.View do
          do: {millimetres / 1000, Pose.distance(pose(trial, robot), landmark)},
          else: (_does_not_see -> nil)
   end
-
-  @doc "The references of those who lead."
-  @spec anchors(Trial.t()) :: [{leader :: atom(), Missions.Landmark.Reference.t()}]
-  def anchors(trial) do
-    for {id, %{phase: :lead, anchor: %{order: _} = anchor}} <- Trial.claims(trial),
-        do: {id, anchor}
-  end
 end

@@ -1,8 +1,8 @@
 defmodule Sim.Chaos.RunnerTest do
   use Sim.LockstepCase, async: true
   @moduletag :slow
-  import ExUnit.CaptureLog
-  alias Sim.Chaos.{Draw, Runner, ScenarioFile, Violation}
+  alias Sim.Chaos.{Draw, Runner, ScenarioFile}
+  alias Sim.Invariants.Violation
   alias Sim.Scenario
 
   doctest Sim.Chaos.Isolated
@@ -49,15 +49,37 @@ defmodule Sim.Chaos.RunnerTest do
     assert [%Violation{invariant: :crash, figures: "not a run: " <> _}] = Runner.found(run)
   end
 
-  # A span of delays that ends before it begins is refused by the radio alone, which raises.
-  defp raising(seed, number),
-    do: Keyword.merge(small(seed, number), start: :same, delay_ms: {50, 5})
+  defmodule Raising do
+    @moduledoc "A mission that raises when it begins, or after a second."
+    @behaviour Robot.Mission
 
-  test "a run that raises is a violation, with the function" do
-    capture_log(fn ->
-      assert %{clean?: false, runs: [run]} = Runner.run(1, [1], draw: &raising/2, attempts: 2)
-      assert [%Violation{invariant: :crash}] = Runner.found(run)
-    end)
+    @impl Robot.Mission
+    def option_table, do: [at_once: :boolean]
+
+    @impl Robot.Mission
+    def init(robot, options) do
+      if options[:at_once], do: raise("out of order")
+      {:idle, robot, []}
+    end
+
+    @impl Robot.Mission
+    def handle({:tick, %{at_ms: at_ms}}, _robot) when at_ms >= 1_000, do: raise("out of order")
+    def handle(_event, robot), do: {:search, robot, []}
+  end
+
+  test "a run that raises is a violation, with the function, and made small as any other" do
+    for {options, at_ms, duration_s, function} <- [
+          {[], 1_000, 2, "handle/2"},
+          {[at_once: true], 0, 1, "init/2"}
+        ] do
+      draw = &Keyword.put(small(&1, &2), :mission, {Raising, options})
+      assert %{clean?: false, runs: [run]} = Runner.run(1, [1], draw: draw, attempts: 20)
+      assert [%Violation{invariant: :crash, at_ms: ^at_ms, figures: line}] = Runner.found(run)
+      assert line =~ ~r/"out of order".* in #{inspect(Raising)}\.#{function}$/
+      assert [%{smallest: smallest, again: again}] = run.failures
+      assert smallest[:duration_s] == duration_s and length(smallest[:robots]) == 1
+      assert again.figures == line
+    end
   end
 
   test "some false claims among many are within the goal, other violations never" do
@@ -90,7 +112,7 @@ defmodule Sim.Chaos.RunnerTest do
     assert {:ok, "chaos-1-8-collision.exs", text} = ScenarioFile.text(1, failure)
     assert {:ok, scenario} = Scenario.File.parse(text)
     assert scenario.about =~ "Run 8 of seed 1: collision at 12.3 s, mag1 mag2"
-    assert scenario.expect == [{:no_collision}]
+    assert scenario.expect == [{:never, :collision}]
 
     given = for {key, value} <- smallest, key != :script, value not in [nil, []], do: {key, value}
     # That of its runs, and not that of a file that does not say.

@@ -64,7 +64,13 @@ defmodule Sim.Scenario.FileTest do
     {"[expect: [{:at, :all, {1, 1}, within_m: 1, by_s: 2}]]", "a.exs:1: expect.1.robot: ",
      "a robot of this run"},
     {"[expect: [{:phase, :all, :laed, by_s: 2}]]", "a.exs:1: expect.1.phase: ",
-     "did you mean :lead?"}
+     "did you mean :lead?"},
+    {"[seed: 1,\n expect: [{:never, :too_fats}]]", "a.exs:2: expect.1.invariant: ",
+     "crash, got :too_fats; did you mean :too_fast?"},
+    {"[expect: [\n {:never, 5}]]", "a.exs:2: expect.1.invariant: ", "expected :two_leaders, "},
+    {"[expect: [{:never}]]", "a.exs:1: expect.1: ", "expected {:never, invariant}, got {:never}"},
+    {"[expect: [{:never, :crash, to_s: 5}]]", "a.exs:1: expect.1: ",
+     "expected {:never, invariant}"}
   ]
 
   # What only the map shows: known when a file is opened.
@@ -152,6 +158,7 @@ defmodule Sim.Scenario.FileTest do
               formation: {:wedge, 1.25},
               lost_link: :hold,
               moves: [{{1, 2.0}, 3}],
+              kills: Enum.random([[leader: 9], [leader: 9, leader: 30]]),
               cuts: [{1, :end, [[robot], []]}]
             ],
             3
@@ -173,7 +180,7 @@ defmodule Sim.Scenario.FileTest do
         expect:
           Enum.take_random(
             [
-              :no_collision,
+              {:never, :collision},
               {:formed, by_s: 60},
               {:at, robot, {1, 2}, within_m: 0.25, by_s: 50},
               {:never_phase, :all, :lead},

@@ -47,7 +47,7 @@ defmodule Sim.Scenario.RunnerTest do
     calm_s = ends.([{:never_phase, :mag1, :lead}])
     assert calm_s < 100
     assert ends.([{:never_phase, :mag1, :lead, from_s: 60, to_s: 130}]) == 130.0
-    assert ends.([{:speed_at_most, 1, to_s: 140}, :no_collision]) == 140.0
+    assert ends.([{:speed_at_most, 1, to_s: 140}, {:never, :collision}]) == 140.0
     assert ends.([{:one_leader, after_s: 150, to_s: 160}]) == 150.0
     assert ends.([{:never_phase, :mag1, :lead, from_s: 150}]) == 155.0
     assert ends.([{:never_phase, :mag1, :lead, from_s: 10}]) == calm_s
@@ -61,7 +61,7 @@ defmodule Sim.Scenario.RunnerTest do
 
   test "a robot that touches the wall is found" do
     script = [{0, {:displace, :mag1, {7, 0, 0}}}, {0, {:tell, :mag1, "move:0.3:0"}}]
-    {_result, [verdict]} = run(@alone, script, [:no_collision])
+    {_result, [verdict]} = run(@alone, script, [{:never, :collision}])
     assert verdict.held?, "the gate stops it: #{verdict.figures}"
   end
 
@@ -155,7 +155,11 @@ defmodule Sim.Scenario.RunnerTest do
 
   test "the same scenario gives the same run" do
     script = [{3, {:freeze, :mag1, 2}}, {6, {:displace, :min1, {4, 3, 0}}}, {7, {:kill, :mag2}}]
-    run = fn -> run([robots: 3, duration_s: 12], script, [:no_collision, {:formed, by_s: 12}]) end
+
+    run = fn ->
+      run([robots: 3, duration_s: 12], script, [{:never, :collision}, {:formed, by_s: 12}])
+    end
+
     assert :erlang.term_to_binary(run.()) == :erlang.term_to_binary(run.())
   end
 

@@ -77,15 +77,6 @@ defmodule Sim.Scenario.Check.Bodies do
      "#{if near, do: m(near), else: "nobody"} at the nearest", nil}
   end
 
-  def judge({:no_collision}, trial, _) do
-    count = trial.world.collisions
-
-    figures =
-      if count == 0, do: "none", else: Enum.map_join(trial.world.contacts, "; ", &contact/1)
-
-    {:keep, count == 0, figures, nil}
-  end
-
   defp speed(most, trial, fastest) do
     speeds =
       for id <- trial.options.robots, {v, w} = View.speed(trial, id), do: {abs(v), id, v, w}
@@ -110,12 +101,6 @@ defmodule Sim.Scenario.Check.Bodies do
       "#{id} at #{Float.round(v, 3)} m/s and #{Float.round(w, 3)} rad/s"
     end)
   end
-
-  defp contact({at_ms, [{id, {x, y}, _speed}], :wall}),
-    do: "#{id} touched a wall at #{at_ms / 1000} s, at #{m(x)}, #{m(y)}"
-
-  defp contact({at_ms, [{a, {x, y}, _}, {b, _place, _}], :robots}),
-    do: "#{a} and #{b} touched at #{at_ms / 1000} s, at #{m(x)}, #{m(y)}"
 
   defp m(metres), do: "#{Float.round(metres * 1.0, 2)} m"
 end

@@ -4,7 +4,7 @@ defmodule Sim.Scenario.Check.Fleet do
   # answers are those of `Sim.Scenario.Check`.
   alias Sim.Scenario.{Check, Expectation, View}
   alias Sim.Trial
-  alias Sim.Trial.{Claims, RunLog}
+  alias Sim.Trial.RunLog
 
   @doc "The answer at this tick; `memory` is what the last one returned, at first `nil`."
   @spec judge(Expectation.t(), Trial.t(), memory :: term()) :: Check.answer()
@@ -73,28 +73,6 @@ defmodule Sim.Scenario.Check.Fleet do
     reach(so?, fn _ -> Enum.map_join(claims, ", ", &says/1) end)
   end
 
-  # The report judges claims that still stand too, so only those whose time is over count here.
-  def judge({:claims_true}, trial, _) do
-    %{standing: standing, told: told} = trial.run_log.claims
-    claims = told ++ for({_id, {_since, claim}} <- standing, do: claim)
-    wrong = Enum.filter(claims, &(Claims.right?(&1) == false))
-    told = fn -> wrong |> Enum.sort_by(&{&1.at_s, &1.robot}) |> Enum.map_join("; ", &claim/1) end
-    keep(wrong == [], told, "#{length(claims)} claims")
-  end
-
-  def judge({:never_stuck}, trial, _) do
-    stuck = Sim.Trial.Stuck.report(trial.run_log.stuck)
-
-    told = fn ->
-      Enum.map_join(stuck, "; ", &"#{&1.robot} since #{&1.at_s} s, #{m(&1.error_m)} off its slot")
-    end
-
-    keep(stuck == [], told, "none was")
-  end
-
-  def judge({:slots_unique}, trial, _), do: unique(trial)
-  def judge({:slots_unique, _window}, trial, _), do: unique(trial)
-
   defp reach(so?, figures), do: {:reach, so?, figures.(so?), nil}
   defp keep(true, _wrong, figures), do: {:keep, true, figures, nil}
   defp keep(false, wrong, _figures), do: {:keep, false, wrong.(), nil}
@@ -135,22 +113,5 @@ defmodule Sim.Scenario.Check.Fleet do
       [] -> "#{id} says nothing of its place"
       words -> "#{id} says #{Enum.join(words, " and ")}"
     end
-  end
-
-  defp claim(claim) do
-    later = if claim.worst_5s_m, do: ", #{m(claim.worst_5s_m)} 5 s later", else: ""
-    "#{claim.robot} claimed at #{claim.at_s} s, with a robot #{m(claim.worst_m)} off#{later}"
-  end
-
-  defp m(metres), do: "#{Float.round(metres * 1.0, 2)} m"
-
-  defp unique(trial) do
-    wrong =
-      for {leader, anchor} <- View.anchors(trial),
-          anchor.places != Enum.uniq(anchor.places) or anchor.order != Enum.uniq(anchor.order) or
-            leader in anchor.order,
-          do: "#{leader} gives #{inspect(Enum.zip(anchor.order, anchor.places))}"
-
-    keep(wrong == [], fn -> Enum.join(wrong, "; ") end, "one slot for each")
   end
 end

@@ -1,4 +1,4 @@
-defmodule Sim.Chaos.Violation do
+defmodule Sim.Invariants.Violation do
   @moduledoc "Describes what was wrong in a run: which invariant, when, with which robots, and the figures in one line."
 
   @enforce_keys [:invariant, :at_ms, :robots, :figures]
@@ -14,8 +14,8 @@ defmodule Sim.Chaos.Violation do
   @doc """
   A violation as one line.
 
-      iex> violation = Sim.Chaos.Violation.new(:collision, 12_300, [:mag1, :mag2], "at 0.31 m/s")
-      iex> Sim.Chaos.Violation.line(violation)
+      iex> violation = Sim.Invariants.Violation.new(:collision, 12_300, [:mag1, :mag2], "at 0.31 m/s")
+      iex> Sim.Invariants.Violation.line(violation)
       "collision at 12.3 s, mag1 mag2: at 0.31 m/s"
   """
   @spec line(t()) :: String.t()
@@ -35,6 +35,22 @@ defmodule Sim.Chaos.Violation do
       robots: Enum.sort(robots),
       figures: figures
     }
+
+  @doc """
+  The violation of a run that raised at this time; `reason` is that with which its process ends.
+
+      iex> Sim.Invariants.Violation.crash(3_100, {:badarith, [{:erlang, :/, [1, 0], []}]}).figures
+      ":badarith in :erlang.//2"
+  """
+  @spec crash(non_neg_integer(), reason :: term()) :: t()
+  def crash(at_ms, reason), do: new(:crash, at_ms, [], ended(reason))
+
+  defp ended({reason, [{module, function, arity, _place} | _stack]}) do
+    arity = if is_list(arity), do: length(arity), else: arity
+    "#{inspect(reason, limit: 8)} in #{inspect(module)}.#{function}/#{arity}"
+  end
+
+  defp ended(reason), do: "exit #{inspect(reason, limit: 8)}"
 
   @doc "A figure with so many decimals."
   @spec decimals(number(), 0..15) :: String.t()

@@ -1,4 +1,4 @@
-defmodule Sim.Chaos.Invariants.Leaders do
+defmodule Sim.Invariants.Leaders do
   @moduledoc """
   Judges who leads, for each part of the radio (`Sim.Radio.parts/2`: robots that can reach each
   other, if necessary by way of others). Pure; fed every 100 ms.
@@ -27,7 +27,7 @@ defmodule Sim.Chaos.Invariants.Leaders do
   Robots that are not asked: one alone that has lost everybody (it stands, `lost_link`), one whose
   mission is ended by a stop, and a minority where a majority is needed.
   """
-  alias Sim.Chaos.Violation
+  alias Sim.Invariants.Violation
 
   @known_ms 2_000
   @two_ms 1_800
@@ -71,7 +71,7 @@ defmodule Sim.Chaos.Invariants.Leaders do
   @doc """
   By how much longer agreement may take if this share of the messages is lost.
 
-      iex> Sim.Chaos.Invariants.Leaders.factor(0.5)
+      iex> Sim.Invariants.Leaders.factor(0.5)
       4.0
   """
   @spec factor(number()) :: float()

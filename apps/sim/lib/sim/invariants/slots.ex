@@ -1,4 +1,4 @@
-defmodule Sim.Chaos.Invariants.Slots do
+defmodule Sim.Invariants.Slots do
   @moduledoc """
   Judges that no two followers of one leader and epoch take the same slot. Pure; fed every 100 ms.
 
@@ -12,7 +12,7 @@ defmodule Sim.Chaos.Invariants.Slots do
   older order. The loss of messages does not make that longer: an anchor grows old by itself.
   """
   alias Missions.Landmark.State
-  alias Sim.Chaos.Violation
+  alias Sim.Invariants.Violation
   alias Missions.Landmark.Reference
 
   @fresh_ms 1_000

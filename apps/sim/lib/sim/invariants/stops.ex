@@ -1,12 +1,12 @@
-defmodule Sim.Chaos.Invariants.Stops do
+defmodule Sim.Invariants.Stops do
   @moduledoc false
   # Judges how an emergency stop spreads. Pure; fed every 100 ms.
   #
   # `stop_lost`: a stop that holds one robot of a part of the radio holds all of that part, but those
   # that a person has reset since. Heartbeats carry it at 5 Hz, so it is given 2 s, the time after which
   # a robot from which nothing comes is gone (docs/architecture.md), divided by (1 - loss)^2.
-  alias Sim.Chaos.Invariants.Leaders
-  alias Sim.Chaos.Violation
+  alias Sim.Invariants.Leaders
+  alias Sim.Invariants.Violation
   alias Swarm.EStop
 
   @spread_ms 2_000

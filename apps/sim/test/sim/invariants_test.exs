@@ -1,15 +1,17 @@
-defmodule Sim.Chaos.InvariantsTest do
+defmodule Sim.InvariantsTest do
   @moduledoc "Each invariant is violated by what a test constructs, and not by what is next to it."
   use Sim.LockstepCase, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Sim.Chaos.{Invariants, Run, Violation}
-  alias Sim.Chaos.Invariants.{Leaders, Limits, Slots, Stops}
+  alias Sim.Chaos.Run
+  alias Sim.Invariants
+  alias Sim.Invariants.{Leaders, Limits, Slots, Stops, Violation}
   alias Sim.{Trial, World}
   alias Swarm.EStop
   alias Missions.Landmark.Reference
 
-  doctest Sim.Chaos.Violation
-  doctest Sim.Chaos.Invariants.Leaders
+  doctest Sim.Invariants.Attempt
+  doctest Sim.Invariants.Violation
+  doctest Sim.Invariants.Leaders
 
   @three [:mag1, :mag2, :mag3]
 
@@ -162,12 +164,12 @@ defmodule Sim.Chaos.InvariantsTest do
       %{World.Body.new(robot, 0, 1, :off) | wanted: wanted}
     end
 
-    defp driven(bodies, held \\ []) do
+    defp driven(bodies, held \\ [], lifted \\ []) do
       {found, _judge} =
         bodies
         |> Enum.with_index(1)
         |> Enum.flat_map_reduce(Limits.new(), fn {body, k}, judge ->
-          Limits.note(judge, 100 * k, [body], held)
+          Limits.note(judge, 100 * k, [body], held, lifted)
         end)
 
       Enum.map(found, & &1.invariant)
@@ -198,6 +200,7 @@ defmodule Sim.Chaos.InvariantsTest do
       crawling = for k <- 0..30, do: body(Twist.zero(), 0.01 * k)
       assert driven(crawling) == []
       assert :stop_ignored in driven(crawling, [:mag1])
+      assert driven(crawling, [:mag1], [:mag1]) == []
     end
   end
 

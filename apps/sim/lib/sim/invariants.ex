@@ -1,28 +1,29 @@
-defmodule Sim.Chaos.Invariants do
+defmodule Sim.Invariants do
   @moduledoc """
-  Judges a run in lockstep at every tick, from outside. Pure.
+  Judges a run in lockstep at every tick, from outside. Pure. `mix chaos` asks for all invariants
+  (`Sim.Chaos.Run`), a scenario for those that it names (`{:never, invariant}`, `Sim.Scenario.Check`).
 
   | invariant | judged by |
   |---|---|
-  | `two_leaders`, `same_epoch`, `two_majorities`, `not_together`, `no_leader` | `Sim.Chaos.Invariants.Leaders` |
-  | `same_slot`, `bad_anchor` | `Sim.Chaos.Invariants.Slots` |
-  | `too_fast`, `too_abrupt`, `stop_ignored` | `Sim.Chaos.Invariants.Limits` |
-  | `stop_lost` | `Sim.Chaos.Invariants.Stops` |
+  | `two_leaders`, `same_epoch`, `two_majorities`, `not_together`, `no_leader` | `Sim.Invariants.Leaders` |
+  | `same_slot`, `bad_anchor` | `Sim.Invariants.Slots` |
+  | `too_fast`, `too_abrupt`, `stop_ignored` | `Sim.Invariants.Limits` |
+  | `stop_lost` | `Sim.Invariants.Stops` |
   | `collision` | contacts of `Sim.World`: a robot with a robot, alive or dead, or with a wall |
   | `stuck` | `Sim.Trial.Stuck`: short of its slot for 20 s without a word |
   | `false_claim` | `Sim.Trial.Claims`: `formed`, and the worst robot more than 0.5 m off then or 5 s later |
+  | `crash` | a step of the run that raises (`step/2`) |
 
   `false_claim` is a promise in probability: a follower is in place if that is true in 95 of 100 cases,
   and the published goal is 99 % of all claims. Each false claim is told; whether many runs together
-  violate it is decided by `goal/0` (`Sim.Chaos.Runner`).
+  violate it is decided by `goal/0` (`Sim.Chaos.Runner`). It is judged at the end of the run.
 
   A frozen robot is not asked anything: what it claimed last is old, and it cannot report that it is
   stuck. A robot that hears nothing, or whose camera is blind, is.
 
   Only the first violation of each invariant by the same robots is kept.
   """
-  alias Sim.Chaos.Invariants.{Leaders, Limits, Slots, Stops, Withdrawals}
-  alias Sim.Chaos.Violation
+  alias Sim.Invariants.{Attempt, Leaders, Limits, Slots, Stops, Violation, Withdrawals}
   alias Sim.{Radio, Trial}
   alias Sim.Trial.{Claims, Faults, Stuck}
 
@@ -45,7 +46,7 @@ defmodule Sim.Chaos.Invariants do
           told: %{{atom(), [atom()]} => Violation.t()}
         }
 
-  @doc "All invariants, in the order of the report; `crash` is a run that raised."
+  @doc "All invariants, in the order of the report."
   @spec names() :: [atom(), ...]
   def names, do: @names
 
@@ -64,6 +65,22 @@ defmodule Sim.Chaos.Invariants do
     }
   end
 
+  @doc """
+  Advances the trial by 100 ms and judges it. One that raises stays as it was before that, and has violated `crash`.
+  """
+  @spec step(t(), Trial.t()) :: {Trial.t(), t()}
+  def step(judge, %Trial{} = trial) do
+    attempt = fn ->
+      stepped = Trial.step(trial)
+      {stepped, note(judge, stepped)}
+    end
+
+    case Attempt.call(attempt) do
+      {:ok, done} -> done
+      {:exit, reason} -> {trial, tell(judge, [Violation.crash(trial.at_ms, reason)])}
+    end
+  end
+
   @doc "One tick: the trial after a step."
   @spec note(t(), Trial.t()) :: t()
   def note(judge, %Trial{at_ms: at_ms, world: world} = trial) do
@@ -79,7 +96,7 @@ defmodule Sim.Chaos.Invariants do
 
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, parts)
     {placed, slots} = Slots.note(judge.slots, at_ms, missions)
-    {driven, limits} = Limits.note(judge.limits, at_ms, bodies, held)
+    {driven, limits} = Limits.note(judge.limits, at_ms, bodies, held, lifted(trial))
     {stopped, stops} = Stops.note(judge.stops, at_ms, stops, parts)
     withdrawals = Withdrawals.note(judge.withdrawals, at_ms, claims)
 
@@ -111,7 +128,7 @@ defmodule Sim.Chaos.Invariants do
   @doc """
   Whether a claim was true (`Sim.Trial.Claims.right?/1`), `nil` if there is nothing to judge. One that
   was being withdrawn when it was judged again is judged by its beginning alone
-  (`Sim.Chaos.Invariants.Withdrawals`).
+  (`Sim.Invariants.Withdrawals`).
   """
   @spec right?(t(), Claims.claim()) :: boolean() | nil
   def right?(judge, claim) do
@@ -125,10 +142,21 @@ defmodule Sim.Chaos.Invariants do
   def violations(judge),
     do: judge.told |> Map.values() |> Enum.sort_by(&{&1.at_ms, &1.invariant, &1.robots})
 
+  @doc "The first violation of this invariant up to now, `nil` if there is none."
+  @spec first(t(), atom()) :: Violation.t() | nil
+  def first(judge, invariant),
+    do: judge |> violations() |> Enum.find(&(&1.invariant == invariant))
+
   @doc "Whether this invariant was violated up to now."
   @spec violated?(t(), atom()) :: boolean()
   def violated?(judge, invariant),
     do: Enum.any?(judge.told, fn {{name, _robots}, _violation} -> name == invariant end)
+
+  # Those that a person has put somewhere else in this step.
+  defp lifted(%{at_ms: at_ms, run_log: %{stages: newest_first}}) do
+    now = Enum.take_while(newest_first, &(round(&1.at_s * 1000) >= at_ms - 100))
+    for %{stage: :displaced, robot: id} <- now, do: id
+  end
 
   # The world keeps the newest contacts.
   defp contacts(%{collisions: known} = judge, %{collisions: known}), do: {[], judge}

@@ -1,4 +1,4 @@
-defmodule Sim.Chaos.Invariants.Withdrawals do
+defmodule Sim.Invariants.Withdrawals do
   @moduledoc false
   # Notes when claims of `formed` end, so that none is called false for the time that it takes to
   # withdraw it. Pure; fed every 100 ms.

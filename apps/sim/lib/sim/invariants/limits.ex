@@ -1,4 +1,4 @@
-defmodule Sim.Chaos.Invariants.Limits do
+defmodule Sim.Invariants.Limits do
   @moduledoc """
   Judges what robots tell their wheels, and how they truly moved, by their profiles. Pure; fed every
   100 ms, which are two steps of the reflexes.
@@ -9,10 +9,12 @@ defmodule Sim.Chaos.Invariants.Limits do
   | `too_abrupt` | a speed grows by at most the profile's acceleration, and shrinks by at most twice that; a stop is at once (`Robot.Safety.Reflex`) |
   | `stop_ignored` | while a stop holds a robot, it wants to stand; 2 s later it stands |
 
+  A robot that a person has lifted did not drive there.
+
   2 s: at half a metre a second and half a metre a second squared a base needs 1 s, and 0.1 s of lag
   for each factor e down to a tenth of a millimetre a second.
   """
-  alias Sim.Chaos.Violation
+  alias Sim.Invariants.Violation
 
   @tick_s 0.1
   @slack 1.0e-6
@@ -30,17 +32,22 @@ defmodule Sim.Chaos.Invariants.Limits do
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
-  @doc "One tick: the living bodies, and which robots a stop holds."
-  @spec note(t(), integer(), [Sim.World.Body.t()], [atom()]) :: {[Violation.t()], t()}
-  def note(judge, at_ms, bodies, held) do
+  @doc "One tick: the living bodies, which robots a stop holds, and which have been lifted to where they are."
+  @spec note(t(), integer(), [Sim.World.Body.t()], [atom()], [atom()]) :: {[Violation.t()], t()}
+  def note(judge, at_ms, bodies, held, lifted) do
+    before =
+      for {id, {wanted, pose}} <- judge.before, into: %{} do
+        {id, {wanted, if(id in lifted, do: nil, else: pose)}}
+      end
+
     held = Map.new(held, &{&1, Map.get(judge.held, &1, at_ms)})
 
     wrong =
       for body <- bodies,
           {invariant, figures} <-
-            fast(body, judge.before[body.id]) ++
-              abrupt(body, judge.before[body.id]) ++
-              moving(body, judge.before[body.id], held[body.id], at_ms),
+            fast(body, before[body.id]) ++
+              abrupt(body, before[body.id]) ++
+              moving(body, before[body.id], held[body.id], at_ms),
           do: Violation.new(invariant, at_ms, [body.id], figures)
 
     {wrong, %{judge | before: Map.new(bodies, &{&1.id, {&1.wanted, &1.pose}}), held: held}}
@@ -97,6 +104,7 @@ defmodule Sim.Chaos.Invariants.Limits do
   end
 
   defp way(_body, nil), do: 0.0
+  defp way(_body, {_wanted, nil}), do: 0.0
   defp way(body, {_wanted, pose}), do: Hal.Pose.distance(body.pose, pose)
 
   defp figure(value), do: Violation.decimals(value, 3)
