@@ -225,6 +225,64 @@ defmodule Swarm.MemberTest do
     refute started |> sense(500) |> sense(600) |> stands?(600)
   end
 
+  defp rolling do
+    options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
+    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    member = member |> sense(100) |> sense(200)
+    refute stands?(member, 200)
+    elem(Member.step(member, {:reflex, 200}), 0)
+  end
+
+  test "a part that crashes begins anew, idle, with those behind it, until somebody starts it" do
+    for role <- [:gate, :executive, :pilot] do
+      {crashed, effects} = Member.step(rolling(), {:crash, role, 250})
+      # Executive and pilot make the gate drop the wish, which is told to the wheels at once.
+      assert List.last(for {:drive, twist} <- effects, do: twist) |> Twist.zero?()
+      assert %{state: :idle} = crashed.pilot
+      assert crashed.boot == 2
+      crashed = crashed |> sense(300) |> sense(400)
+      assert stands?(crashed, 400)
+      {started, []} = Member.step(crashed, {:command, :start, 500})
+      refute started |> sense(500) |> sense(600) |> stands?(600)
+    end
+  end
+
+  test "a gate that crashes while it is latched is latched again, and only a reset clears it" do
+    {held, _} = Member.step(rolling(), {:command, :estop, 250})
+    {held, _} = Member.step(held, {:crash, :gate, 300})
+    assert {held, [{:drive, twist}]} = Member.step(held, {:reflex, 350})
+    assert Twist.zero?(twist)
+    assert %{driving: {%{limits: [:estop]}, 350}} = held.entries
+    {free, _} = Member.step(held, {:command, :reset, 400})
+    {free, _} = Member.step(free, {:command, :start, 450})
+    refute free |> sense(500) |> sense(600) |> stands?(600)
+  end
+
+  test "an executive that hangs leaves the gate without wishes, and goes on, or is killed after 2 s" do
+    {hung, []} = Member.step(rolling(), {:hang, :executive, 1_000, 250})
+    hung = Enum.reduce(300..900//100, hung, &sense(&2, &1))
+    # The dead man's switch.
+    assert stands?(hung, 900)
+    well = hung |> sense(1_000) |> sense(1_100)
+    refute stands?(well, 1_100)
+    assert {Deaf, _phase} = well.pilot.state
+
+    {hung, []} = Member.step(rolling(), {:hang, :executive, 60_000, 250})
+    killed = Enum.reduce(300..2_400//100, hung, &sense(&2, &1))
+    assert %{state: :idle} = killed.pilot
+    assert stands?(killed, 2_400)
+  end
+
+  test "a stop ends what a robot does while its mission hangs, and nothing that waited begins it again" do
+    {hung, []} = Member.step(rolling(), {:hang, :pilot, 1_000, 250})
+    hung = sense(hung, 300)
+    refute stands?(hung, 300)
+    {stopped, _} = Member.step(hung, {:command, :stop, 350})
+    stopped = Enum.reduce(400..1_500//100, stopped, &sense(&2, &1))
+    assert stands?(stopped, 1_500)
+    assert %{state: :idle} = stopped.pilot
+  end
+
   defp stands?(member, at_ms) do
     {_member, [{:drive, twist}]} = Member.step(member, {:reflex, at_ms})
     Twist.zero?(twist)

@@ -62,15 +62,22 @@ defmodule Robot.Host do
     begun_us = System.monotonic_time(:microsecond)
     at_ms = Robot.Config.now(s.config)
     checkpoint(s, at_ms)
-    s = tick(s, at_ms)
-    took_us = System.monotonic_time(:microsecond) - begun_us
 
-    if took_us > @slow_us do
-      measured = %{at_ms: Robot.Config.now(s.config), duration_ms: div(took_us, 1_000)}
-      Event.execute([:robot, s.role.name(), :slow], measured, %{robot: s.config.id})
+    case tick(s, at_ms) do
+      :unknown ->
+        HardenedServer.drop(s)
+
+      s ->
+        slow(s, System.monotonic_time(:microsecond) - begun_us)
+        {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
     end
+  end
 
-    {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
+  defp slow(_s, took_us) when took_us <= @slow_us, do: :ok
+
+  defp slow(s, took_us) do
+    measured = %{at_ms: Robot.Config.now(s.config), duration_ms: div(took_us, 1_000)}
+    Event.execute([:robot, s.role.name(), :slow], measured, %{robot: s.config.id})
   end
 
   defp checkpoint(s, at_ms),

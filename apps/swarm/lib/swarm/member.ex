@@ -66,7 +66,10 @@ defmodule Swarm.Member do
           entries: %{atom() => {term(), integer()}},
           sequence: non_neg_integer(),
           beat_ms: integer() | nil,
-          hung: %{atom() => {until_ms :: integer(), killed_ms :: integer(), waiting :: [Robot.Role.input()]}}
+          hung: %{
+            atom() =>
+              {until_ms :: integer(), killed_ms :: integer(), waiting :: [Robot.Role.input()]}
+          }
         }
 
   @type input ::
@@ -290,13 +293,16 @@ defmodule Swarm.Member do
   defp hand(role, %{hung: hung} = member, input, _at_ms) when is_map_key(hung, role) do
     {until_ms, killed_ms, waiting} = hung[role]
     # A ticker asks for its next tick when the last one was handled, so one waits at most.
-    waiting = if match?({:tick, _}, input), do: Enum.reject(waiting, &match?({:tick, _}, &1)), else: waiting
+    waiting =
+      if match?({:tick, _}, input),
+        do: Enum.reject(waiting, &match?({:tick, _}, &1)),
+        else: waiting
+
     {put_in(member.hung[role], {until_ms, killed_ms, [input | waiting]}), []}
   end
 
   defp hand(role, member, input, at_ms) do
-    {state, effects} =
-      module(role).handle(input, at_ms, Map.fetch!(member, role), member.entries)
+    {state, effects} = module(role).handle(input, at_ms, Map.fetch!(member, role), member.entries)
 
     carry(effects, Map.put(member, role, state), at_ms)
   end

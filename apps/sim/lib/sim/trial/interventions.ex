@@ -86,7 +86,8 @@ defmodule Sim.Trial.Interventions do
   end
 
   defp act({:crash, id, role}, trial),
-    do: {stage(trial, :crashed, id, %{crash: "its #{role}, by the script"}), [{id, {:crash, role}}]}
+    do:
+      {stage(trial, :crashed, id, %{crash: "its #{role}, by the script"}), [{id, {:crash, role}}]}
 
   defp act({:hang, id, role, for_s}, trial) do
     until_ms = trial.at_ms + round(for_s * 1000)
