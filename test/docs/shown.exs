@@ -5,10 +5,11 @@ defmodule Docs.Shown do
   Both are read as terms are written: text, and what stands in brackets with commas between it. A map's entries,
   and those of a struct, may come in any order, as releases of OTP print them in different ones; all else has its order.
 
-    * `…` as an element after others stands for one at least; as the last one, for all that come
+    * `…` as an element after others stands for one at least
     * `…` as an entry of a map stands for one more entry at least, whatever its place
     * `…` alone in its brackets stands for anything, and for nothing
-    * `…` within an element stands for any part of it: `25.…`, `"no robot…"`, `age: …`
+    * `…` within an element stands for any part of it: `25.…`, `"no robot…"`, `age: …`; at the end of the last one also for
+      those that come, if any: `age 3 ms…`
 
   What has no such brackets, as their pairs do not match, is compared as text (`Docs.Reader.like?/2`).
   """
@@ -85,10 +86,14 @@ defmodule Docs.Shown do
   defp elements?(wanted, found), do: ordered?(wanted, found)
 
   defp ordered?([], []), do: true
-  defp ordered?([[?…]], [_ | _]), do: true
 
-  defp ordered?([first | wanted], [one | found]),
-    do: parts?(first, one) and ordered?(wanted, found)
+  defp ordered?([[?…] | wanted] = open, [_ | found]),
+    do: ordered?(wanted, found) or ordered?(open, found)
+
+  defp ordered?([first | wanted], [one | found]) do
+    more? = wanted == [] and match?([_, _ | _], first) and List.last(first) == ?…
+    parts?(first, one) and (more? or ordered?(wanted, found))
+  end
 
   defp ordered?(_wanted, _found), do: false
 
