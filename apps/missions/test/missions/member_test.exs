@@ -259,7 +259,7 @@ defmodule Swarm.MemberTest do
   end
 
   test "an executive that hangs leaves the gate without wishes, and goes on, or is killed after 2 s" do
-    {hung, []} = Member.step(rolling(), {:hang, :executive, 1_000, 250})
+    {hung, []} = Member.step(rolling(), {:hang, {:executive, 1_000}, 250})
     hung = Enum.reduce(300..900//100, hung, &sense(&2, &1))
     # The dead man's switch.
     assert stands?(hung, 900)
@@ -267,14 +267,14 @@ defmodule Swarm.MemberTest do
     refute stands?(well, 1_100)
     assert {Deaf, _phase} = well.pilot.state
 
-    {hung, []} = Member.step(rolling(), {:hang, :executive, 60_000, 250})
+    {hung, []} = Member.step(rolling(), {:hang, {:executive, 60_000}, 250})
     killed = Enum.reduce(300..2_400//100, hung, &sense(&2, &1))
     assert %{state: :idle} = killed.pilot
     assert stands?(killed, 2_400)
   end
 
   test "a stop ends what a robot does while its mission hangs, and nothing that waited begins it again" do
-    {hung, []} = Member.step(rolling(), {:hang, :pilot, 1_000, 250})
+    {hung, []} = Member.step(rolling(), {:hang, {:pilot, 1_000}, 250})
     hung = sense(hung, 300)
     refute stands?(hung, 300)
     {stopped, _} = Member.step(hung, {:command, :stop, 350})

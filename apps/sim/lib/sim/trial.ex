@@ -163,7 +163,7 @@ defmodule Sim.Trial do
 
   # A fault of its program is no command of a person.
   defp told({:crash, role}, at_ms), do: {:crash, role, at_ms}
-  defp told({:hang, role, until_ms}, at_ms), do: {:hang, role, until_ms, at_ms}
+  defp told({:hang, role, until_ms}, at_ms), do: {:hang, {role, until_ms}, at_ms}
   defp told(command, at_ms), do: {:command, command, at_ms}
 
   @doc "The robots that have not been killed, in the order of the fleet."

@@ -13,7 +13,7 @@ defmodule Swarm.Member do
   | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then what it forwards, then (5 Hz) the heartbeat |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
   | `{:crash, role, at_ms}` | a fault: this role begins anew, and those behind it, as under their supervisor |
-  | `{:hang, role, until_ms, at_ms}` | a fault: what arrives at executive or pilot waits; after 2 s it is killed |
+  | `{:hang, {role, until_ms}, at_ms}` | a fault: what arrives at executive or pilot waits; after 2 s it is killed |
 
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
@@ -80,7 +80,7 @@ defmodule Swarm.Member do
           | {:tick, integer()}
           | {:reflex, integer()}
           | {:crash, :gate | :executive | :pilot, integer()}
-          | {:hang, :executive | :pilot, until_ms :: integer(), integer()}
+          | {:hang, {:executive | :pilot, until_ms :: integer()}, integer()}
 
   @type effect ::
           {:drive, Twist.t()}
@@ -124,7 +124,7 @@ defmodule Swarm.Member do
   @spec step(t(), input()) :: {t(), [effect()]}
   def step(member, {:crash, role, at_ms}) when role in @roles, do: crash(member, role, at_ms)
 
-  def step(member, {:hang, role, until_ms, at_ms}) when role in [:executive, :pilot] do
+  def step(member, {:hang, {role, until_ms}, at_ms}) when role in [:executive, :pilot] do
     {member, effects} = member |> recovered(at_ms)
     {put_in(member.hung[role], {until_ms, at_ms + @killed_ms, []}), effects}
   end

@@ -59,6 +59,7 @@ defmodule Sim.Chaos.DrawTest do
     assert length(Enum.uniq(for {kind, _spacing} <- drawn.(:formation), do: kind)) == 6
 
     events = for run <- runs, {_at_s, event} <- run[:script], uniq: true, do: elem(event, 0)
+
     assert Enum.sort(events) == [:blind, :deaf, :estop, :freeze, :loss, :reset, :tell]
 
     cuts = for run <- runs, {_from_s, to_s, what} <- run[:cuts], do: {to_s, what}

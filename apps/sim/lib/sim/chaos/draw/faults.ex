@@ -1,7 +1,6 @@
 defmodule Sim.Chaos.Draw.Faults do
   @moduledoc false
-  # Draws the script of a run (`Sim.Trial.Event`): robots that freeze, or see or hear nothing for a while, parts of their
-  # program that crash or hang,
+  # Draws the script of a run (`Sim.Trial.Event`): robots that freeze, or see or hear nothing for a while,
   # a radio that becomes worse for a while, people who press the emergency stop and start again, or ask
   # for another shape. Pure; times in whole seconds.
   alias Sim.Chaos.Draw.Events
@@ -22,16 +21,7 @@ defmodule Sim.Chaos.Draw.Faults do
         {robot, random} = Random.pick(random, robots)
 
         {kind, random} =
-          Random.weighted(random,
-            freeze: 4,
-            blind: 3,
-            deaf: 3,
-            loss: 2,
-            estop: 2,
-            shape: 2,
-            crash: 3,
-            hang: 3
-          )
+          Random.weighted(random, freeze: 4, blind: 3, deaf: 3, loss: 2, estop: 2, shape: 2)
 
         script(kind, at_s, if(leader?, do: :leader, else: robot), loss, random)
       end)
@@ -42,19 +32,6 @@ defmodule Sim.Chaos.Draw.Faults do
   defp script(kind, at_s, who, _loss, random) when kind in [:freeze, :blind, :deaf] do
     {for_s, random} = Random.number(random, 0.5, 12.0, 1)
     {[{at_s, {kind, who, for_s}}], random}
-  end
-
-  # A robot that begins anew stands until a person starts it.
-  defp script(:crash, at_s, who, _loss, random) do
-    {role, random} = Random.pick(random, [:gate, :executive, :pilot])
-    {for_s, random} = Random.whole(random, 1, 5)
-    {[{at_s, {:crash, who, role}}, {at_s + for_s, {:tell, :all, :start}}], random}
-  end
-
-  defp script(:hang, at_s, who, _loss, random) do
-    {role, random} = Random.pick(random, [:executive, :pilot])
-    {for_s, random} = Random.number(random, 0.3, 3.0, 1)
-    {[{at_s, {:hang, who, role, for_s}}, {at_s + ceil(for_s) + 1, {:tell, :all, :start}}], random}
   end
 
   defp script(:loss, at_s, _who, loss, random) do
