@@ -35,6 +35,7 @@ defmodule Robot.Host do
       role: role,
       perceives?: function_exported?(role, :perceive, 3),
       foreign?: function_exported?(role, :foreign, 2),
+      door?: function_exported?(role, :whole?, 1),
       config: config,
       board: board,
       state: state,
@@ -84,9 +85,11 @@ defmodule Robot.Host do
     do: Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
 
   defp arrived(input, s) do
-    case hand(input, s, Robot.Config.now(s.config)) do
-      :unknown -> HardenedServer.drop(s)
-      s -> {:noreply, s}
+    with true <- not s.door? or s.role.whole?(input),
+         %{} = s <- hand(input, s, Robot.Config.now(s.config)) do
+      {:noreply, s}
+    else
+      _not_whole_or_unknown -> HardenedServer.drop(s)
     end
   end
 

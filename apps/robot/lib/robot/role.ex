@@ -78,9 +78,12 @@ defmodule Robot.Role do
   @doc "The input of a tick, for a role whose ticks read the board."
   @callback perceive(at_ms :: integer(), state(), Board.t()) :: input()
 
+  @doc "Whether an input that looks like one of its own is whole: asked at the door of its process, not in lockstep."
+  @callback whole?(input()) :: boolean()
+
   @doc "The module of others whose code runs on this input, so that one that hangs is found and named."
   @callback foreign(input(), state()) :: module() | nil
-  @optional_callbacks perceive: 3, foreign: 2
+  @optional_callbacks perceive: 3, foreign: 2, whole?: 1
 
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::

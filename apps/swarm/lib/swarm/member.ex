@@ -337,7 +337,10 @@ defmodule Swarm.Member do
     do: {[{:send, to, Message.of(member.config.id, body)}], member}
 
   defp carry_one({:stage, _name, _facts} = stage, member, _at_ms), do: {[stage], member}
-  defp carry_one({:put, key, value}, member, at_ms), do: {[], put(member, key, value, at_ms)}
+  # Of what is put on the board the gate reads its own again, when it begins anew.
+  defp carry_one({:put, key, value}, member, at_ms) when key in [:frame, :presses],
+    do: {[], put(member, key, value, at_ms)}
+
   defp carry_one({:latch, set?}, member, at_ms), do: {[], put(member, :latch, set?, at_ms)}
   defp carry_one(:tick, member, at_ms), do: back(gate(member, :tick, at_ms))
   defp carry_one(_inside, member, _at_ms), do: {[], member}

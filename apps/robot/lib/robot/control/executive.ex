@@ -133,23 +133,21 @@ defmodule Robot.Control.Executive do
   def perceive(at_ms, s, board), do: {:tick, Percept.Snapshot.take(board, s.profile, at_ms)}
 
   @impl Role
+  def whole?({:ask, _from, {:goal, _tag, _goal} = order}), do: Inbox.order?(order)
+  def whole?({:cast, {:obey, order}}), do: Inbox.order?(order)
+  def whole?(_other), do: true
+
+  @impl Role
   def handle({:tick, %Percept{} = raw}, _at_ms, s, _board), do: tick(s, raw)
 
   def handle({:ask, from, {:goal, _tag, _goal} = order}, _at_ms, s, board) do
-    cond do
-      not Inbox.order?(order) -> :unknown
-      refusal = refusal(order, s, board) -> {s, [{:answer, from, refusal}]}
-      true -> answered(obeyed(s, order), from)
-    end
+    if refusal = refusal(order, s, board),
+      do: {s, [{:answer, from, refusal}]},
+      else: answered(obeyed(s, order), from)
   end
 
-  def handle({:cast, {:obey, order}}, _at_ms, s, board) do
-    cond do
-      not Inbox.order?(order) -> :unknown
-      refusal(order, s, board) -> {s, []}
-      true -> obeyed(s, order)
-    end
-  end
+  def handle({:cast, {:obey, order}}, _at_ms, s, board),
+    do: if(refusal(order, s, board), do: {s, []}, else: obeyed(s, order))
 
   def handle({:cast, {:confirm, then, result}}, _at_ms, s, _board) do
     cond do

@@ -173,6 +173,10 @@ defmodule Robot.Control.Pilot do
   def foreign(_input, %{runner: %{module: module}}), do: module
 
   @impl Role
+  def whole?({:cast, {:deliver, delivery, _event}}), do: Inbox.delivery?(delivery)
+  def whole?(_other), do: true
+
+  @impl Role
   def handle({:ask, from, :start}, _at_ms, %{mission: nil} = s, _board),
     do: {s, [{:answer, from, {:error, :no_mission}}]}
 
@@ -227,9 +231,13 @@ defmodule Robot.Control.Pilot do
     end
   end
 
-  def handle({:cast, {:deliver, delivery, {:command, _command} = event}}, at_ms, s, board) do
-    if Inbox.delivery?(delivery), do: delivered(delivery, event, at_ms, s, board), else: :unknown
-  end
+  def handle(
+        {:cast, {:deliver, %Delivery{} = delivery, {:command, _c} = event}},
+        at_ms,
+        s,
+        board
+      ),
+      do: delivered(delivery, event, at_ms, s, board)
 
   def handle(_unknown, _at_ms, _s, _board), do: :unknown
 
