@@ -4,8 +4,7 @@ defmodule Swarm.Comms do
 
   In: `Swarm.Message.check/1` checks every message; malformed ones are dropped and counted.
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Out: the
-  mission's messages, what is forwarded (`Swarm.Message.Forwarder`) and, five times a second, a heartbeat with the
-  robot's state from the board.
+  mission's messages and, five times a second, a heartbeat with the robot's state from the board.
 
   An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started beside the comms process,
   owns the state of the stop and is told of each heartbeat that differs from it. Of two robots
@@ -195,9 +194,9 @@ defmodule Swarm.Comms do
     %{s | peer_writer: PeerWriter.heard(s.peer_writer, s.receiver.peers, id, at_ms)}
   end
 
-  defp heard(s, {:message, message}, at_ms) do
+  defp heard(s, {:message, message}, _at_ms) do
     Pilot.hear(s.id, {:message, message})
-    forward(s, Receiver.forward(s.receiver, message, at_ms))
+    s
   end
 
   defp heard(s, :nothing, _at_ms), do: s
@@ -207,14 +206,8 @@ defmodule Swarm.Comms do
     s = %{s | peer_writer: PeerWriter.grow_old(s.peer_writer, s.receiver.peers, at_ms)}
     counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
     Board.put(s.board, :comms, :radio, counts, at_ms)
-    s = forward(s, Receiver.forward(s.receiver, at_ms))
     s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}
     if rem(s.sender.ticks, @rivals_every) == 0, do: rivals(s, at_ms), else: s
-  end
-
-  defp forward(s, {receiver, sendings}) do
-    speak = fn {:send, to, message}, sender -> Sender.speak(sender, to, message) end
-    %{s | receiver: receiver, sender: Enum.reduce(sendings, s.sender, speak)}
   end
 
   defp rivals(s, at_ms) do

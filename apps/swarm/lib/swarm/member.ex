@@ -10,7 +10,7 @@ defmodule Swarm.Member do
   | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
-  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then what it forwards, then (5 Hz) the heartbeat |
+  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
   | `{:crash, role, at_ms}` | a fault: this role begins anew, and those behind it, as under their supervisor |
   | `{:hang, {role, until_ms}, at_ms}` | a fault: what arrives at executive or pilot waits; after 2 s it is killed |
@@ -213,9 +213,8 @@ defmodule Swarm.Member do
 
   defp tick(member, at_ms) do
     {member, effects} = executive(member, {:tick, percept(member, at_ms)}, at_ms)
-    {receiver, forwarded} = Receiver.forward(member.receiver, at_ms)
-    {member, beats} = beat(%{member | receiver: receiver}, at_ms)
-    {member, effects ++ forwarded ++ beats}
+    {member, beats} = beat(member, at_ms)
+    {member, effects ++ beats}
   end
 
   # As under `Robot.Supervisor`: comms comes last, and begins a new life; the e-stop's state is on the board.
@@ -274,12 +273,8 @@ defmodule Swarm.Member do
 
   defp ways(_other, _member), do: {:ok, [{:hand, {:except, Manual}}]}
 
-  defp heard(member, {:message, message}, at_ms) do
-    {receiver, forwarded} = Receiver.forward(member.receiver, message, at_ms)
-    member = %{member | receiver: receiver}
-    {member, effects} = pilot(member, {:cast, {:message, message}}, at_ms)
-    {member, forwarded ++ effects}
-  end
+  defp heard(member, {:message, message}, at_ms),
+    do: pilot(member, {:cast, {:message, message}}, at_ms)
 
   defp heard(member, :nothing, _at_ms), do: {member, []}
 

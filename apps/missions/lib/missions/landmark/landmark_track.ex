@@ -48,9 +48,11 @@ defmodule Missions.Landmark.LandmarkTrack do
       nil ->
         old
 
-      %{blob: blob, bearing: bearing} ->
+      blob ->
         view = Sighting.field_of_view(percept)
-        distance = Sighting.distance(blob, picture.blobs, @radius, view)
+        bearing = Sighting.bearing(blob, picture.pan, view)
+
+        distance = distance(blob, picture.blobs, view)
         seen = distance && Sighting.place(picture.pose, bearing, distance)
 
         place = smooth(old && old.place, seen)
@@ -66,6 +68,15 @@ defmodule Missions.Landmark.LandmarkTrack do
         }
     end
   end
+
+  # The width of a pole stays right if its foot or top is out of the picture.
+  defp distance(%{clipped?: true, left: left, right: right, width: width} = blob, blobs, view)
+       when left > 0 and right < width - 1 do
+    unless Sighting.hidden?(blob, blobs),
+      do: Sighting.distance_by_width(blob, @radius, view)
+  end
+
+  defp distance(blob, blobs, _view), do: Sighting.distance(blob, blobs)
 
   @doc """
   Whether the place is certain: the landmark was seen within the last `ms`, in its full width, and

@@ -50,6 +50,7 @@ defmodule Missions.Landmark.State do
                 led: 0,
                 rival_ms: nil,
                 higher_ms: nil,
+                forwarder: %Swarm.Comms.Forwarder{},
                 refused: %EpochFilter{}
               ]
 
@@ -113,6 +114,7 @@ defmodule Missions.Landmark.State do
           led: non_neg_integer(),
           rival_ms: integer() | nil,
           higher_ms: integer() | nil,
+          forwarder: Swarm.Comms.Forwarder.t(),
           refused: EpochFilter.t()
         }
 

@@ -1,21 +1,20 @@
 defmodule Swarm.Message.Receiver do
   @moduledoc """
-  Handles the messages that a robot receives, as a function: tracks which robots are present,
-  forwards to those that do not hear each other (`Swarm.Message.Forwarder`), and counts what was dropped. Pure; `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
+  Handles the messages that a robot receives, as a function: tracks which robots are present, and
+  counts what was dropped. Pure; `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
   """
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message
-  alias Swarm.Message.{Checked, Forwarder}
+  alias Swarm.Message.Checked
 
   @enforce_keys [:me, :peers]
-  defstruct @enforce_keys ++ [heard: 0, rejected: %{}, forwarder: Forwarder.new()]
+  defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
 
   @type t :: %__MODULE__{
           me: atom(),
           peers: Peers.t(),
           heard: non_neg_integer(),
-          rejected: %{atom() => pos_integer()},
-          forwarder: Forwarder.t()
+          rejected: %{atom() => pos_integer()}
         }
 
   @typedoc """
@@ -65,20 +64,6 @@ defmodule Swarm.Message.Receiver do
       {:error, reason} ->
         {:nothing, reject(receiver, reason)}
     end
-  end
-
-  @doc "The heartbeats that this robot forwards at a tick, ten times a second."
-  @spec forward(t(), integer()) :: {t(), [Forwarder.sending()]}
-  def forward(%__MODULE__{me: me, peers: %{rows: rows}} = receiver, now_ms) do
-    {forwarder, sendings} = Forwarder.beats(receiver.forwarder, me, rows, now_ms)
-    {%{receiver | forwarder: forwarder}, sendings}
-  end
-
-  @doc "The same for a `{:message, message}` that was heard just now."
-  @spec forward(t(), Message.t(), integer()) :: {t(), [Forwarder.sending()]}
-  def forward(%__MODULE__{me: me, peers: %{rows: rows}} = receiver, message, now_ms) do
-    {forwarder, sendings} = Forwarder.letter(receiver.forwarder, me, rows, message, now_ms)
-    {%{receiver | forwarder: forwarder}, sendings}
   end
 
   @doc "Counts what was dropped, and why; possibly several of a kind at once."

@@ -1,32 +1,28 @@
-defmodule Swarm.Message.Forwarder do
+defmodule Swarm.Comms.Forwarder do
   @moduledoc """
   Forwards messages between robots that do not hear each other, so that robots that are connected only through
   others act as one group. Pure.
 
   The heartbeat of each robot lists the robots that it hears. If one robot's list lacks another
-  for a while, a robot in contact with both forwards the heartbeats and letters of the
-  latter directly to the former: those of rounds to their view, and those of missions to their addressees
-  (`Robot.Mission.Letter`). If several could, the first two by name do. Letters go through
+  for a while, a robot in contact with both forwards the heartbeats and round letters of the
+  latter directly to the former. If several could, the first two by name do. Letters go through
   three relays at most; heartbeats stop where they are known. A relayed message counts as a sign
   of life, but not as heard, so that the forwarding goes on as long as it is needed.
   """
-  alias Robot.Mission
-  alias Swarm.Agreement.Round
   alias Swarm.Message
   alias Swarm.Membership.{Heartbeat, NameSet}
 
   # A robot that has just joined is not in anybody's list yet.
   @patience_ms 300
-  # Letters of rounds are repeated every 100 ms; the same letter arrives more often by several ways.
+  # Letters are repeated every 100 ms; the same letter arrives more often by several ways.
   @repeat_ms 90
   @alive_ms 1_000
   @relays 2
 
-  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}, whole: %{}
+  defstruct missing: %{}, beats: %{}, letters: %{}, heard: {[], <<>>}
 
   @typedoc """
-  `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `whole` has the
-  lists in which none of them was missing, because the next ones of the same robots are mostly equal. `missing`
+  `heard` has the robots that are heard now, sorted, and the set of these and of this one; it seldom changes. `missing`
   says since when a robot (the second of the pair) has not heard another; `beats` and
   `letters` say what was last forwarded from which robot to which.
   """
@@ -34,72 +30,46 @@ defmodule Swarm.Message.Forwarder do
           missing: %{{atom(), atom()} => integer()},
           beats: %{{atom(), atom()} => {integer(), integer()}},
           letters: %{{atom(), atom()} => {non_neg_integer(), integer()}},
-          heard: {[atom()], NameSet.t()},
-          whole: %{atom() => NameSet.t()}
+          heard: {[atom()], NameSet.t()}
         }
 
-  @typedoc "The robots that were heard of: their newest heartbeats, and when they were heard (`Swarm.Membership.Peers`)."
-  @type peers :: %{
-          atom() => %{
-            :beat => Heartbeat.t(),
-            :at_ms => integer(),
-            :direct_ms => integer() | nil,
-            optional(atom()) => term()
-          }
-        }
-
-  @typedoc "One message, and to which robots it goes."
-  @type sending :: {:send, [atom()], Message.t()}
+  @typedoc "The peers of a percept."
+  @type peers :: %{atom() => Robot.Percept.peer()}
 
   @doc "The state before anything is forwarded."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc "The heartbeats to forward now, as `{:send, [to], message}`."
-  @spec beats(t(), atom(), peers(), integer()) :: {t(), [sending()]}
+  @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
   def beats(relay, me, peers, now_ms) do
-    {names, _all} = heard = heard(relay.heard, me, peers, now_ms)
-    whole = if heard == relay.heard, do: relay.whole, else: %{}
-    {lacking, whole} = Enum.reduce(names, {[], whole}, &look(&1, &2, heard, peers))
-    relay = %{relay | heard: heard, whole: whole}
+    {names, all} = heard = heard(relay.heard, me, peers, now_ms)
 
     pairs =
-      for {to, roll} <- Enum.reverse(lacking),
+      for to <- names,
+          %{^to => %{beat: %{heard: roll}}} = peers,
+          not NameSet.all_but?(roll, all, to),
           NameSet.member?(roll, me),
           from <- names -- NameSet.names(roll),
           from != to,
           do: {from, to}
 
     if pairs == [] and relay.missing == %{},
-      do: {relay, []},
-      else: forward(relay, me, peers, pairs, now_ms)
-  end
-
-  defp look(to, {lacking, whole}, {_names, all}, peers) do
-    %{^to => %{beat: %{heard: roll}}} = peers
-
-    cond do
-      match?(%{^to => ^roll}, whole) -> {lacking, whole}
-      NameSet.all_but?(roll, all, to) -> {lacking, Map.put(whole, to, roll)}
-      true -> {[{to, roll} | lacking], whole}
-    end
+      do: {%{relay | heard: heard}, []},
+      else: forward(%{relay | heard: heard}, me, peers, pairs, now_ms)
   end
 
   # Those that are heard now, and the set of these and of this robot: mostly the same as before.
   defp heard({names, _all} = before, me, peers, now_ms) do
-    if Enum.all?(names, &known?(peers, &1, now_ms)) and others(peers, length(names), now_ms) == 0 do
+    ids = for {id, peer} <- Map.to_list(peers), alive?(peer, now_ms), do: id
+
+    if length(ids) == length(names) and Enum.all?(names, &known?(peers, &1, now_ms)) do
       before
     else
-      names = Enum.sort(for {id, peer} <- peers, alive?(peer, now_ms), do: id)
+      names = Enum.sort(ids)
       {names, NameSet.new([me | names])}
     end
   end
-
-  # How many more than these are heard now.
-  defp others(peers, count, _now_ms) when map_size(peers) == count, do: 0
-
-  defp others(peers, count, now_ms),
-    do: Enum.count(peers, fn {_id, peer} -> alive?(peer, now_ms) end) - count
 
   defp known?(peers, id, now_ms) do
     case peers do
@@ -144,20 +114,20 @@ defmodule Swarm.Message.Forwarder do
   end
 
   @doc """
-  The same for a letter that was heard just now, for those of its addressees that do not hear its
-  sender. Messages that are for the robots alone that were sent them are not forwarded.
+  The same for a letter that was heard just now, for those robots of its view that do not hear its
+  sender.
   """
   @spec letter(t(), atom(), peers(), Message.t(), integer()) ::
-          {t(), [sending()]}
+          {t(), [{:send, [atom()], Message.t()}]}
   def letter(%{missing: missing} = relay, _me, _peers, _message, _now_ms) when missing == %{},
     do: {relay, []}
 
-  def letter(relay, me, peers, %Message{kind: kind, from: from, body: body} = message, now_ms)
-      when kind in [:round, :mission] do
-    content = content(body)
+  def letter(relay, me, peers, %Message{kind: :round, from: from, body: letter} = message, now_ms) do
+    content = :erlang.phash2(%{letter | remaining_ms: 0})
 
-    for to <- Enum.sort(for {{^from, to}, _since_ms} <- relay.missing, do: to),
-        addressed?(body, to),
+    for to <- letter.view,
+        to not in [me, from],
+        is_map_key(relay.missing, {from, to}),
         fresh?(relay.letters[{from, to}], content, now_ms),
         mine?(me, from, to, peers, now_ms),
         {:ok, relayed} <- [Message.pass_on(message, me)],
@@ -166,14 +136,6 @@ defmodule Swarm.Message.Forwarder do
         {put_in(relay.letters[{from, to}], {content, now_ms}), [{:send, [to], relayed} | sent]}
     end
   end
-
-  def letter(relay, _me, _peers, _message, _now_ms), do: {relay, []}
-
-  defp content(%Round.Letter{} = letter), do: :erlang.phash2(%{letter | remaining_ms: 0})
-  defp content(%Mission.Letter{} = letter), do: :erlang.phash2(letter)
-
-  defp addressed?(%Round.Letter{view: view}, to), do: to in view
-  defp addressed?(%Mission.Letter{} = letter, to), do: Mission.Letter.to?(letter, to)
 
   defp fresh?({content, at_ms}, content, now_ms), do: now_ms - at_ms >= @repeat_ms
   defp fresh?(_other, _content, _now_ms), do: true

@@ -1,9 +1,8 @@
-defmodule Swarm.Message.ForwarderTest do
+defmodule Swarm.Comms.ForwarderTest do
   use ExUnit.Case, async: true
-  alias Robot.Mission.Letter
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Message.Forwarder
+  alias Swarm.Comms.Forwarder
   alias Swarm.Membership.{Heartbeat, Peers}
 
   # What mag2 hears from mag1 and mag3, which list these robots as heard; numbered by time.
@@ -58,23 +57,6 @@ defmodule Swarm.Message.ForwarderTest do
     assert {_relay, []} = run([mag1: [], mag3: [:mag1, :mag2]], 10)
   end
 
-  test "begins when a list that was whole lacks a robot, and ends when it has it again" do
-    together = [mag1: [:mag2, :mag3], mag3: [:mag1, :mag2]]
-    lacks = [mag1: [:mag2, :mag3], mag3: [:mag2]]
-    # A robot comes whose list is whole, too.
-    four = [mag1: [:mag2, :mag3, :mag4], mag3: [:mag1, :mag2, :mag4], mag4: [:mag1, :mag2, :mag3]]
-
-    {_relay, sent} =
-      [together, together, lacks, lacks, lacks, lacks, together, four, lacks ++ [four: [:mag2]]]
-      |> Enum.with_index(1)
-      |> Enum.reduce({Forwarder.new(), []}, fn {heard, n}, {relay, all} ->
-        {relay, sent} = Forwarder.beats(relay, :mag2, peers(heard, n * 100), n * 100)
-        {relay, all ++ Enum.map(summary(sent), &{n, &1})}
-      end)
-
-    assert sent == [{6, {[:mag3], :mag1, 1}}]
-  end
-
   test "of several robots that could forward, the first two do" do
     all = [:aaa, :bbb, :mag1, :mag2, :mag3]
     others = [aaa: all -- [:aaa], bbb: all -- [:bbb]]
@@ -101,30 +83,6 @@ defmodule Swarm.Message.ForwarderTest do
     assert {_relay, [_]} = hear.(relay, %{letter | ask: true, report: nil}, 540)
     far = %{Message.new(:mag1, :round, letter) | hops: 3}
     assert {_, []} = Forwarder.letter(relay, :mag2, peers, far, 900)
-  end
-
-  test "forwards a mission's letter to its addressees, and to no other robot" do
-    {relay, _sent} = run(@apart, 4)
-    peers = peers(@apart, 400)
-
-    for {to, forwarded} <- [{:all, [[:mag3]]}, {[:mag2, :mag3], [[:mag3]]}, {[:mag2], []}] do
-      letter = %Letter{to: to, mission: __MODULE__, version: 1, kind: :seen, fields: []}
-      message = Message.new(:mag1, :mission, letter)
-      {_relay, sent} = Forwarder.letter(relay, :mag2, peers, message, 400)
-      assert for({:send, to, _relayed} <- sent, do: to) == forwarded
-
-      for {:send, _to, relayed} <- sent do
-        assert {:ok, ^relayed} = Message.check(relayed)
-        assert relayed.body == %{message | hops: 1}
-      end
-    end
-  end
-
-  test "forwards no claim: it is for the robots alone that were sent it" do
-    {relay, _sent} = run(@apart, 4)
-    claim = %Robot.Mission.Claim{mission: __MODULE__, version: 1, fields: %{}}
-    message = Message.new(:mag1, :claim, claim)
-    assert {^relay, []} = Forwarder.letter(relay, :mag2, peers(@apart, 400), message, 400)
   end
 
   test "relays only whole heartbeats and letters, wrapped once" do
