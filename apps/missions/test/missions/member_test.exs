@@ -301,6 +301,61 @@ defmodule Swarm.MemberTest do
     assert :bumper in limits
   end
 
+  # How often each of these functions is called meanwhile, by this process alone.
+  defp calls(functions, fun) do
+    for function <- functions, do: :erlang.trace_pattern(function, true, [:local])
+    test = self()
+
+    {pid, monitor} =
+      spawn_monitor(fn ->
+        receive(do: (:go -> fun.()))
+        delivered = :erlang.trace_delivered(self())
+        receive(do: ({:trace_delivered, _me, ^delivered} -> send(test, :done)))
+      end)
+
+    :erlang.trace(pid, true, [:call])
+    send(pid, :go)
+    assert_receive :done
+    assert_receive {:DOWN, ^monitor, :process, ^pid, :normal}
+    for function <- functions, do: :erlang.trace_pattern(function, false, [:local])
+    Enum.frequencies(called(pid))
+  end
+
+  defp called(pid) do
+    receive do
+      {:trace, ^pid, :call, {module, name, arguments}} ->
+        [{module, name, length(arguments)} | called(pid)]
+    after
+      0 -> []
+    end
+  end
+
+  test "a tick evaluates the landmark in the picture once, and once whether the robot must be cautious" do
+    blob = %Vision.Blob{
+      colour: "YellowLandmark",
+      area: 800,
+      share: 0.01,
+      x: 200.5,
+      y: 119.5,
+      left: 191,
+      right: 210,
+      top: 100,
+      bottom: 140,
+      width: 320,
+      height: 240,
+      distance: 2.5
+    }
+
+    picture = &{:detections, %Vision.Detections{at_ms: &1, blobs: [blob]}}
+    {searches, []} = member() |> sense(100) |> Member.step(picture.(200))
+    assert %{phase: :search} = searches.runner
+    evaluated = {Robot.Percept.Sighting, :bearing, 3}
+    cautious = {Robot.Behaviour.Avoid.Caution, :check, 3}
+
+    assert calls([evaluated, cautious], fn -> Member.step(searches, {:tick, 200}) end) ==
+             %{evaluated => 1, cautious => 1}
+  end
+
   defmodule Watcher do
     @moduledoc "A mission that reports the camera's field of view."
     @behaviour Robot.Mission

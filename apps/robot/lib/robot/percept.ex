@@ -21,6 +21,7 @@ defmodule Robot.Percept do
                 power: nil,
                 ptz: nil,
                 detections: nil,
+                objects: nil,
                 peers: %{},
                 driving: nil,
                 grid: nil,
@@ -69,7 +70,8 @@ defmodule Robot.Percept do
         }
 
   @typedoc """
-  `detections` are the blobs of the newest picture. `driving` is the speed that the gate last let
+  `detections` are the blobs of the newest picture, `objects` the largest of each colour (`Robot.Percept.Sighting`), `nil`
+  before the robot has looked. `driving` is the speed that the gate last let
   through, and the limits that it applied. `grid` is what the robot knows of
   walls, by a floor plan or by its sonars (`Robot.Navigation.OccupancyGrid`), `nil` for nothing; `ways` is the floor plan
   with what its sonars have seen besides (`Robot.Navigation.KnownWalls`), `nil` if that is nothing.
@@ -87,6 +89,7 @@ defmodule Robot.Percept do
           power: float() | nil,
           ptz: %{pan: float(), tilt: float(), field_of_view: float()} | nil,
           detections: Vision.Detections.t() | nil,
+          objects: Robot.Percept.Sighting.objects() | nil,
           peers: %{atom() => peer()},
           driving: %{twist: Twist.t(), limits: [atom()]} | nil,
           grid: Robot.Navigation.Grid.t() | nil,

@@ -48,11 +48,9 @@ defmodule Missions.Landmark.LandmarkTrack do
       nil ->
         old
 
-      blob ->
+      %{blob: blob, bearing: bearing} ->
         view = Sighting.field_of_view(percept)
-        bearing = Sighting.bearing(blob, picture.pan, view)
-
-        distance = distance(blob, picture.blobs, view)
+        distance = Sighting.distance(blob, picture.blobs, @radius, view)
         seen = distance && Sighting.place(picture.pose, bearing, distance)
 
         place = smooth(old && old.place, seen)
@@ -68,15 +66,6 @@ defmodule Missions.Landmark.LandmarkTrack do
         }
     end
   end
-
-  # The width of a pole stays right if its foot or top is out of the picture.
-  defp distance(%{clipped?: true, left: left, right: right, width: width} = blob, blobs, view)
-       when left > 0 and right < width - 1 do
-    unless Sighting.hidden?(blob, blobs),
-      do: Sighting.distance_by_width(blob, @radius, view)
-  end
-
-  defp distance(blob, blobs, _view), do: Sighting.distance(blob, blobs)
 
   @doc """
   Whether the place is certain: the landmark was seen within the last `ms`, in its full width, and

@@ -60,6 +60,7 @@ defmodule Robot.Behaviour.Avoid do
       velocity: nil,
       yield: nil,
       right: %RightOfWay{},
+      slow?: false,
       echoes: if(unmapped?, do: %Echoes{})
     }
 
@@ -76,7 +77,7 @@ defmodule Robot.Behaviour.Avoid do
   @impl Robot.Behaviour
   def tick(percept, state) do
     {slow?, echoes} = Caution.check(percept, state.discs, state.echoes)
-    state = %{state | echoes: echoes}
+    state = %{state | slow?: slow?, echoes: echoes}
 
     if slow?,
       do: drive(Caution.percept(percept), state, &Caution.wish/1),

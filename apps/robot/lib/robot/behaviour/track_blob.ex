@@ -38,7 +38,7 @@ defmodule Robot.Behaviour.TrackBlob do
   @calm 0.3
   @lively 0.7
   @lost_ms 700
-  # An object that covers more of the picture than this is too near to be measured.
+  # An object that covers more of the picture than this is too near, whatever distance it seems to have.
   @too_near_share 0.3
 
   @impl Robot.Behaviour

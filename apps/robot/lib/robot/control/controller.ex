@@ -17,6 +17,7 @@ defmodule Robot.Control.Controller do
   alias Hal.Profile
   alias Robot.{Localiser, Mission, Percept, Wish}
   alias Robot.Behaviour.Arbiter
+  alias Robot.Percept.Sighting
   alias Robot.Navigation.{Grid, KnownWalls}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
@@ -170,7 +171,7 @@ defmodule Robot.Control.Controller do
   """
   @spec tick(t(), Percept.t()) :: {Wish.t(), {tag :: term(), integer()} | nil, t()}
   def tick(%__MODULE__{} = controller, %Percept{} = percept) do
-    {percept, controller} = locate(controller, percept)
+    {percept, controller} = locate(controller, Sighting.note(percept))
     {escaping, escape, nil} = run(controller.escape, percept)
     {resting, rest, nil} = run(controller.rest, percept)
     {wanted, goal, outcome} = run(controller.goal, percept)
@@ -204,11 +205,7 @@ defmodule Robot.Control.Controller do
 
   @doc "What made the goal's wish slower at the last tick, before the gate: `:caution` (`Robot.Behaviour.Avoid.Caution`)."
   @spec limits(t()) :: [:caution]
-  def limits(%__MODULE__{goal: {Avoid, state}, percept: %Percept{} = percept}) do
-    {slow?, _echoes} = Avoid.Caution.check(percept, state.discs, state.echoes)
-    if slow?, do: [:caution], else: []
-  end
-
+  def limits(%__MODULE__{goal: {Avoid, %{slow?: true}}}), do: [:caution]
   def limits(%__MODULE__{}), do: []
 
   @doc """
@@ -227,7 +224,7 @@ defmodule Robot.Control.Controller do
   """
   @spec wishes(t(), Percept.t()) :: [{Wish.t(), weight :: float()}]
   def wishes(%__MODULE__{} = controller, %Percept{} = percept) do
-    {percept, controller} = locate(controller, percept)
+    {percept, controller} = locate(controller, Sighting.note(percept))
 
     for(
       behaviour <- [controller.escape, controller.goal, controller.rest],

@@ -37,6 +37,7 @@ defmodule Robot.Localiser.Matching do
   @type pair :: %{
           mark: Anchors.mark(),
           blob: Blob.t(),
+          bearing: float(),
           slack: float(),
           whole?: boolean()
         }
@@ -55,8 +56,14 @@ defmodule Robot.Localiser.Matching do
           InSight.t()
         ) :: [pair()]
   def pairs(robots, blobs, belief, exposed, pan, view, in_sight) do
+    colours = Enum.uniq(for mark <- robots, do: mark.colour)
+
     looks =
-      for(blob <- blobs, do: {blob.colour, blob, Sighting.bearing(blob, pan, view)})
+      for(
+        %{colour: colour} = blob <- blobs,
+        colour in colours,
+        do: {colour, blob, Sighting.bearing(blob, pan, view)}
+      )
       |> Enum.group_by(&elem(&1, 0))
 
     glance = Glance.new(belief, exposed, pan, view)
@@ -76,7 +83,7 @@ defmodule Robot.Localiser.Matching do
     for %{mark: mark, blob: blob} = one <- candidates,
         mark.reference? and one.sure? and not cut?(blob) and one.width < @fits,
         Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
-      %{mark: mark, blob: blob, slack: one.slack, whole?: one.width < @whole}
+      %{mark: mark, blob: blob, bearing: one.seen, slack: one.slack, whole?: one.width < @whole}
     end
   end
 
@@ -133,7 +140,7 @@ defmodule Robot.Localiser.Matching do
         slack = abs(share - 1) * half,
         off = max(abs(Pose.wrap(seen - bearing)) - slack, 0.0),
         off < @narrow or off < 3 * bearing_sd,
-        do: {blob, share, slack, off}
+        do: {blob, seen, share, slack, off}
   end
 
   # How certain its distance is, is asked only of a robot that is beside a blob.
@@ -143,13 +150,14 @@ defmodule Robot.Localiser.Matching do
     # If the distance is uncertain, so is the expected width of the blob.
     doubt = 2 * max(distance_sd(mark, distance, belief, exposed) - @surely, 0.0) / distance
 
-    for {blob, share, slack, off} <- beside,
+    for {blob, seen, share, slack, off} <- beside,
         log = :math.log(share),
         cost = cost(off, expected.bearing_sd, log, doubt),
         cost < @unlike do
       %{
         mark: mark,
         blob: blob,
+        seen: seen,
         distance: distance,
         expected: expected.bearing,
         half: expected.half,

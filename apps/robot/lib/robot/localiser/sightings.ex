@@ -46,21 +46,36 @@ defmodule Robot.Localiser.Sightings do
   defp weigh(belief, robots, {percept, back}),
     do: Belief.weigh(belief, Consistency.judge(belief, robots, percept, back))
 
-  # There is only one landmark: the largest unclipped blob of its colour is taken for it.
+  # There is only one landmark: the largest unclipped blob of its colour is taken for it. Its distance is by its area
+  # alone, whose error the filter knows as that of a scale; one by its width would have another.
   defp see_landmarks(belief, landmarks, {percept, _back} = picture) do
     Enum.reduce(landmarks, belief, fn mark, belief ->
-      whole =
-        Enum.filter(percept.detections.blobs, &(&1.colour == mark.colour and not &1.clipped?))
-
-      case Enum.max_by(whole, & &1.area, fn -> nil end) do
+      case whole(percept, mark.colour) do
         nil ->
           belief
 
-        blob ->
-          see(belief, picture, mark, blob, 0.0, Sighting.distance(blob, percept.detections.blobs))
+        %{blob: blob, bearing: bearing} ->
+          distance = Sighting.distance(blob, percept.detections.blobs)
+          see(belief, picture, mark, bearing, 0.0, distance)
       end
     end)
   end
+
+  defp whole(%{detections: %{blobs: blobs} = picture} = percept, colour) do
+    case Sighting.largest(percept, colour) do
+      %{blob: %{clipped?: true}} ->
+        whole = Enum.reject(blobs, & &1.clipped?)
+
+        %{percept | detections: %{picture | blobs: whole}}
+        |> Sighting.note()
+        |> Sighting.largest(colour)
+
+      object ->
+        object
+    end
+  end
+
+  defp see_robots(belief, [], _picture), do: belief
 
   defp see_robots(belief, robots, {percept, back} = picture) do
     view = Sighting.field_of_view(percept)
@@ -70,15 +85,14 @@ defmodule Robot.Localiser.Sightings do
 
     robots
     |> Matching.pairs(percept.detections.blobs, belief, exposed, pan, view, in_sight)
-    |> Enum.reduce(belief, fn %{mark: mark, blob: blob, slack: slack} = pair, belief ->
-      distance = if pair.whole?, do: Sighting.distance_by_width(blob, mark.radius, view)
-      see(belief, picture, mark, blob, slack, distance)
+    |> Enum.reduce(belief, fn %{mark: mark, slack: slack} = pair, belief ->
+      distance = if pair.whole?, do: Sighting.distance_by_width(pair.blob, mark.radius, view)
+      see(belief, picture, mark, pair.bearing, slack, distance)
     end)
   end
 
-  defp see(belief, {percept, back} = picture, mark, blob, slack, distance) do
+  defp see(belief, {_percept, back} = picture, mark, bearing, slack, distance) do
     far = Pose.distance(exposed(belief, back), mark.at)
-    bearing = Sighting.bearing(blob, percept.detections.pan, Sighting.field_of_view(percept))
 
     cond do
       far < @near ->

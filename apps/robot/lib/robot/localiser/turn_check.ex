@@ -103,7 +103,7 @@ defmodule Robot.Localiser.TurnCheck do
   # There is only one object of the colour: the largest blob is taken for it. One that the left or
   # the right border cuts off has its centre elsewhere; top and bottom do not matter.
   defp look(belief, percept, colour, odometry, back) do
-    with %{} = blob <- Sighting.largest(percept, colour),
+    with %{blob: blob, bearing: bearing} <- Sighting.largest(percept, colour),
          true <- blob.left > 0 and blob.right < blob.width - 1 do
       {_way, _turn, turned} = belief.drift
 
@@ -111,7 +111,7 @@ defmodule Robot.Localiser.TurnCheck do
         at_ms: percept.detections.at_ms,
         pose: Pose.compose(odometry, back),
         turned: turned - abs(back.heading),
-        bearing: Sighting.bearing(blob, percept.detections.pan, Sighting.field_of_view(percept))
+        bearing: bearing
       }
     else
       _not_whole -> nil

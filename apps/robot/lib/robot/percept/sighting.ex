@@ -6,6 +6,14 @@ defmodule Robot.Percept.Sighting do
   By the time a picture is evaluated, the robot may have turned. So `of/3` first converts the
   direction to the map frame with the pose at exposure, and then to the body frame with the
   present pose.
+
+  How far an object is, is three questions:
+
+  | answer | for |
+  |---|---|
+  | the `distance` of `of/3`: rough, but there, also if a border clips the blob or something hides a part of it | driving to it and turning to it |
+  | `distance/2`: right, or `nil` | a measurement that corrects a pose |
+  | `distance/4`: the same, and by its width where only foot or top are out of the picture | the place of an object whose width is known |
   """
   alias Hal.Pose
   alias Robot.Percept
@@ -24,6 +32,10 @@ defmodule Robot.Percept.Sighting do
           at_ms: integer()
         }
 
+  @typedoc "The largest blob of a colour, and its direction seen from the body when the picture was taken."
+  @type object :: %{blob: Blob.t(), bearing: float()}
+  @type objects :: %{(colour :: String.t()) => object()}
+
   # Boxes up to this many pixels apart count as touching, because the border between two colours
   # belongs to neither.
   @touch 3
@@ -33,9 +45,8 @@ defmodule Robot.Percept.Sighting do
   @doc "The sighting of the largest blob of a colour (`nil`: of any), or `nil`; see `largest/3`."
   @spec of(Percept.t(), String.t() | nil, float()) :: t() | nil
   def of(percept, colour, min_share \\ 0.0) do
-    with %Blob{} = blob <- largest(percept, colour, min_share) do
+    with %{blob: blob, bearing: seen} <- largest(percept, colour, min_share) do
       picture = percept.detections
-      seen = bearing(blob, picture.pan, field_of_view(percept))
       exposed = picture.pose || percept.pose
       direction = exposed && Pose.wrap(exposed.heading + seen)
 
@@ -94,6 +105,23 @@ defmodule Robot.Percept.Sighting do
 
   def distance(%Blob{} = blob, blobs), do: if(hidden?(blob, blobs), do: nil, else: blob.distance)
 
+  @doc """
+  The same of an upright object of this radius (metres), in a picture with this field of view: the width of a pole stays
+  right if its foot or top is out of the picture.
+  """
+  @spec distance(Blob.t(), [Blob.t()], radius :: float(), field_of_view :: float()) ::
+          float() | nil
+  def distance(
+        %Blob{clipped?: true, left: left, right: right, width: width} = blob,
+        blobs,
+        radius,
+        view
+      )
+      when left > 0 and right < width - 1,
+      do: unless(hidden?(blob, blobs), do: distance_by_width(blob, radius, view))
+
+  def distance(blob, blobs, _radius, _view), do: distance(blob, blobs)
+
   @doc "Whether something of another colour may hide a part of the blob: their boxes touch."
   @spec hidden?(Blob.t(), [Blob.t()]) :: boolean()
   def hidden?(%Blob{} = blob, blobs),
@@ -137,17 +165,52 @@ defmodule Robot.Percept.Sighting do
   def field_of_view(%Percept{profile: profile}), do: profile.camera.field_of_view
 
   @doc """
-  The largest blob of a colour (`nil`: of any) with at least this share of the picture; `nil`
+  The percept with the largest blob of each colour, which localiser, behaviours and mission all ask for.
+  """
+  @spec note(Percept.t()) :: Percept.t()
+  def note(%Percept{} = percept), do: %{percept | objects: objects(%{percept | objects: nil})}
+
+  defp objects(%Percept{detections: nil}), do: %{}
+  defp objects(%Percept{objects: %{} = objects}), do: objects
+
+  defp objects(%Percept{detections: %{blobs: blobs, pan: pan}} = percept) do
+    view = field_of_view(percept)
+
+    for {colour, blob} <- Enum.reduce(blobs, %{}, &larger/2),
+        into: %{},
+        do: {colour, %{blob: blob, bearing: bearing(blob, pan, view)}}
+  end
+
+  defp larger(%{colour: colour} = blob, largest) do
+    case largest do
+      %{^colour => other} ->
+        if size(blob) > size(other), do: %{largest | colour => blob}, else: largest
+
+      _none_yet ->
+        Map.put(largest, colour, blob)
+    end
+  end
+
+  defp size(%{area: area, top: top, left: left}), do: {area, -top, -left}
+
+  @doc """
+  The largest blob of a colour (`nil`: of any) with at least this share of the picture, with its direction; `nil`
   without one, or without a fresh picture. Among equally large blobs the topmost counts, then the
   leftmost.
   """
-  @spec largest(Percept.t(), String.t() | nil, float()) :: Blob.t() | nil
+  @spec largest(Percept.t(), String.t() | nil, float()) :: object() | nil
   def largest(percept, colour, min_share \\ 0.0)
-  def largest(%Percept{detections: nil}, _colour, _min_share), do: nil
 
-  def largest(%Percept{detections: %{blobs: blobs}}, colour, min_share) do
-    blobs
-    |> Enum.filter(&(&1.share >= min_share and colour in [nil, &1.colour]))
-    |> Enum.max_by(&{&1.area, -&1.top, -&1.left}, fn -> nil end)
+  def largest(percept, nil, min_share) do
+    percept
+    |> objects()
+    |> Map.values()
+    |> Enum.max_by(&size(&1.blob), fn -> nil end)
+    |> at_least(min_share)
   end
+
+  def largest(percept, colour, min_share), do: at_least(objects(percept)[colour], min_share)
+
+  defp at_least(%{blob: %{share: share}} = object, min_share) when share >= min_share, do: object
+  defp at_least(_small_or_none, _min_share), do: nil
 end
