@@ -348,7 +348,7 @@ defmodule Swarm.MemberTest do
 
     picture = &{:detections, %Vision.Detections{at_ms: &1, blobs: [blob]}}
     {searches, []} = member() |> sense(100) |> Member.step(picture.(200))
-    assert %{phase: :search} = searches.runner
+    assert %{phase: :search} = searches.pilot.runner
     evaluated = {Robot.Percept.Sighting, :bearing, 3}
     cautious = {Robot.Behaviour.Avoid.Caution, :check, 3}
 
