@@ -550,6 +550,23 @@ defmodule PlayerTest do
     assert options[:ir_order] == nil and options[:ir_banks] == nil
   end
 
+  test "times of the sonars that are too long for all of them are left out" do
+    text = String.replace(@old, "num_sonars 4", "num_sonars 4 sonar_echo_delay 300000")
+    assert {:ok, result} = Player.import(text, colours: &colours/1)
+
+    assert {14, "sonar_echo_delay",
+            "a round of the sonars would take 2.1 s, and 2.0 s are allowed"} in result.left
+
+    assert options(again(result.text))[:sonar_times] == nil
+  end
+
+  test "a head on the line of the base is left out" do
+    text = String.replace(@old, "/dev/ttyS2", "/dev/ttyS1")
+    assert {:ok, result} = Player.import(text, colours: &colours/1)
+    assert {23, "port", "the camera's head is on the base's line, /dev/ttyS1"} in result.left
+    assert again(result.text).ptz == nil
+  end
+
   test "random damage never raises, and what is imported is always a robot" do
     bytes = ~c"[](),\"#.-+ \n\t0159azAZ_:" ++ [0, 200, 255]
 

@@ -167,6 +167,10 @@ defmodule Robot.Config do
   defp plan?(%module{}), do: module in [Robot.Navigation.Grid, Robot.Navigation.OccupancyGrid]
   defp plan?(plan), do: plan == nil
 
+  @doc "How long a round of a robot's sonars may take at most, in seconds."
+  @spec longest_sonar_round_s() :: float()
+  def longest_sonar_round_s, do: @longest_round_s
+
   defp id?(id), do: is_atom(id) and id not in [nil, true, false]
 
   defp check(%{camera: nil, save_pictures: [_ | _]}),

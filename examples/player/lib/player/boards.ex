@@ -5,6 +5,7 @@ defmodule Player.Boards do
   """
   import Player.State
   alias Hal.Profile
+  alias Hal.RFlex.Driver
   alias Player.State
 
   # Options that must not be guessed: they say where each sensor is, and a robot drives by its
@@ -29,7 +30,28 @@ defmodule Player.Boards do
   @spec complete(State.t(), :magellan | :atrv_mini) :: State.t()
   def complete(state, kind) do
     body = apply(Profile, kind, [])
-    state |> banked(body) |> ringed(body)
+    state |> banked(body) |> ringed(body) |> paced(body)
+  end
+
+  # Each time is possible, and with all the sonars they may still be too long: a range would be too old to drive by.
+  defp paced(state, body) do
+    options =
+      for key <- [:sonar_banks, :sonar_times],
+          value = value(state, [:drive, key]),
+          do: {key, value}
+
+    profile = %{body | sonars: value(state, [:body, :sonars]) || body.sonars}
+    seconds = Driver.sonar_round_s([port: "/dev/null", profile: profile] ++ options)
+    longest = Robot.Config.longest_sonar_round_s()
+
+    if seconds > longest,
+      do:
+        leave(
+          state,
+          [[:drive, :sonar_times]],
+          "a round of the sonars would take #{seconds} s, and #{longest} s are allowed"
+        ),
+      else: state
   end
 
   # If the file has no poses, the sonars of our profile are used.

@@ -59,6 +59,21 @@ defmodule Player.Defaults do
         |> assume(1, "#{kind}", "no port is given; #{port} is Player's")
         |> keep(1, "port", [{path, port}])
     end
+    |> parted()
+  end
+
+  # Both on one line is a slip in the file; the base stays.
+  defp parted(state) do
+    port = value(state, [:ptz, :port])
+
+    if port != nil and port == value(state, [:drive, :port]),
+      do:
+        leave(
+          state,
+          &match?({[:ptz | _], _, _, _}, &1),
+          "the camera's head is on the base's line, #{port}"
+        ),
+      else: state
   end
 
   # Player's own wait for an echo, 3000 us, covers only half a metre; this is an error in its

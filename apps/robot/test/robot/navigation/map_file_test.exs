@@ -190,9 +190,9 @@ defmodule Robot.Navigation.MapFileTest do
           file = Path.join(dir, name)
 
           arguments =
-            ~w(-v error -y -f lavfi -i #{source} -frames:v 1 -update 1 -pix_fmt #{format} #{file})
+            ~w(-v error -y -f lavfi -i #{source} -frames:v 1 -update 1 -pix_fmt #{format})
 
-          {"", 0} = System.cmd("ffmpeg", arguments, stderr_to_stdout: true)
+          {"", 0} = System.cmd("ffmpeg", arguments ++ [file], stderr_to_stdout: true)
           assert {:ok, {37, 23, rows}} = MapFile.picture(file, 10_000)
           rows |> IO.iodata_to_binary() |> :binary.bin_to_list()
         end
