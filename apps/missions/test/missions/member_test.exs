@@ -173,12 +173,12 @@ defmodule Swarm.MemberTest do
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
     {one, _} = Member.step(member(), {:command, :estop, 0})
-    assert [_tag] = one.stop.held
+    assert [_tag] = one.estop.stop.held
 
-    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.stop.held})
+    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.estop.stop.held})
 
     two = hear(member(:mag3), pressed)
-    assert two.stop.held == one.stop.held
+    assert two.estop.stop.held == one.estop.stop.held
     assert sense(two, 100).pilot.runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
@@ -186,12 +186,12 @@ defmodule Swarm.MemberTest do
     # A person resets it; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
-    assert two.stop.held == []
+    assert two.estop.stop.held == []
 
     # The next stop is another one, and counts.
     {two, _} = Member.step(two, {:command, :estop, 400})
-    assert [tag] = two.stop.held
-    assert tag not in one.stop.held
+    assert [tag] = two.estop.stop.held
+    assert tag not in one.estop.stop.held
   end
 
   defmodule Deaf do

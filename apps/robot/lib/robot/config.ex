@@ -33,6 +33,8 @@ defmodule Robot.Config do
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`
+
+  `boot` is no option: `Robot.Host` sets it to the time of day at which a role starts (ns), which tells its lives apart.
   """
   alias Hal.{Options, Pose, Profile}
   alias Robot.Fence
@@ -64,7 +66,8 @@ defmodule Robot.Config do
                 replace: false,
                 estop_file: nil,
                 departure_file: nil,
-                trace: nil
+                trace: nil,
+                boot: nil
               ]
 
   @type module_options :: {module(), keyword()}
@@ -92,7 +95,8 @@ defmodule Robot.Config do
           replace: boolean() | :code,
           estop_file: Path.t() | nil,
           departure_file: Path.t() | nil,
-          trace: call() | nil
+          trace: call() | nil,
+          boot: integer() | nil
         }
 
   @doc """

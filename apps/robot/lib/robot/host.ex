@@ -27,6 +27,7 @@ defmodule Robot.Host do
   def init({role, config}) do
     board = Board.find!(config.id)
     at_ms = Robot.Config.now(config)
+    config = %{config | boot: config.boot || System.system_time(:nanosecond)}
     {state, effects} = role.init(config, board, at_ms)
     period_ms = role.period_ms()
     ticker = period_ms && Robot.Config.ticker(config, :tick, period_ms)
@@ -35,7 +36,7 @@ defmodule Robot.Host do
       role: role,
       perceives?: function_exported?(role, :perceive, 3),
       foreign?: function_exported?(role, :foreign, 2),
-      door?: function_exported?(role, :whole?, 1),
+      door?: function_exported?(role, :arrive, 3),
       config: config,
       board: board,
       state: state,
@@ -51,12 +52,10 @@ defmodule Robot.Host do
   def handle_call(message, from, s), do: arrived({:ask, from, message}, s)
 
   @impl GenServer
-  def handle_cast({:tick, _percept} = message, s) do
-    checkpoint(s, Robot.Config.now(s.config))
+  def handle_cast(message, s) do
+    if s.ticker == nil, do: checkpoint(s, Robot.Config.now(s.config))
     arrived({:cast, message}, s)
   end
-
-  def handle_cast(message, s), do: arrived({:cast, message}, s)
 
   @impl GenServer
   def handle_info(:tick, s) do
@@ -85,13 +84,18 @@ defmodule Robot.Host do
     do: Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
 
   defp arrived(input, s) do
-    with true <- not s.door? or s.role.whole?(input),
+    with input when input != :unknown <- whole(input, s),
          %{} = s <- hand(input, s, Robot.Config.now(s.config)) do
       {:noreply, s}
     else
-      _not_whole_or_unknown -> HardenedServer.drop(s)
+      :unknown -> HardenedServer.drop(s)
     end
   end
+
+  defp whole(input, %{door?: false}), do: input
+
+  defp whole(input, s),
+    do: s.role.arrive(input, System.monotonic_time(:microsecond), s.board)
 
   defp tick(s, at_ms) do
     input = if s.perceives?, do: s.role.perceive(at_ms, s.state, s.board), else: :tick
@@ -173,7 +177,14 @@ defmodule Robot.Host do
 
   defp act({:apply, then}, s, at_ms), do: act({:apply, then, []}, s, at_ms)
   defp act({:apply, nil, _more}, _s, _at_ms), do: :ok
+  defp act({:apply, {:cast, _role, _message} = cast, []}, s, at_ms), do: act(cast, s, at_ms)
   defp act({:apply, {m, f, a}, more}, _s, _at_ms), do: apply(m, f, a ++ more)
+
+  defp act({:after, ms, message}, _s, _at_ms),
+    do: Process.send_after(self(), {:"$gen_cast", message}, ms)
+
+  defp act({:disarm, then}, s, _at_ms),
+    do: Device.disarm_later(Names.via(s.config.id, :drive), then)
 
   defp act({:send, to, message}, s, _at_ms),
     do: with({m, f, a} <- s.config.send, do: apply(m, f, a ++ [to, message]))

@@ -178,11 +178,11 @@ defmodule Robot.Replay do
 
   defp entry(%{state: nil} = part, _kind, _what, _at_ms, _role), do: {count(part, :skipped), nil}
 
-  defp entry(part, :input, what, at_ms, role) do
+  defp entry(part, :input, what, at_ms, _role) do
     case settle(part, :whole) do
       {%{state: {:crashed, _line}} = part, nil} -> {%{part | state: nil}, crashed(part)}
       {%{state: nil} = part, difference} -> {count(part, :skipped), difference}
-      {part, nil} -> {replayed(part, role, what, at_ms), nil}
+      {part, nil} -> {replayed(part, what, at_ms), nil}
     end
   end
 
@@ -190,10 +190,10 @@ defmodule Robot.Replay do
     do: {%{part | recorded: [what | part.recorded]}, nil}
 
   # The mission may be anybody's code, and may have crashed on this input in the robot, too.
-  defp replayed(part, role, what, at_ms) do
+  defp replayed(part, what, at_ms) do
     {state, effects} =
       try do
-        Roles.input(role, part.state, what, at_ms)
+        Roles.input(part.state, what, at_ms)
       catch
         kind, reason -> {{:crashed, Exception.format_banner(kind, reason, __STACKTRACE__)}, []}
       end

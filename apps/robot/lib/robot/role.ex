@@ -21,6 +21,8 @@ defmodule Robot.Role do
   | `{:answer, from, result}` | answers `:ask` |
   | `{:answer_saved, from}` | answers `:ask` once the latch is in its file (`Robot.Board.saved/2`) |
   | `{:apply, then}`, `{:apply, then, more}` | tells a part that waits for this (`t:then/0`) |
+  | `{:after, ms, message}` | hands the role this message as a cast, so much later |
+  | `{:disarm, then}` | disarms the wheels, and tells a part that waits for this |
   | `{:send, to, message}` | sends a message to other robots (`Robot.Config`, `:send`) |
   | `{:stage, name, about}` | tells people a stage of the mission (event `[:robot, :stage]`) |
   | `{:phase, state}` | tells that the mission came to this state (event `[:robot, :pilot, :phase]`) |
@@ -40,8 +42,8 @@ defmodule Robot.Role do
           | {:tick, Robot.Percept.t()}
   @type state :: struct()
 
-  @typedoc "What waits for a role: `{m, f, a}`, nothing, or what a recording has in place of the first."
-  @type then :: Robot.Config.call() | nil | :recorded
+  @typedoc "What waits for a role: `{m, f, a}`, a role with its message, nothing, or what a recording has in place of these."
+  @type then :: Robot.Config.call() | {:cast, role :: atom(), message :: term()} | nil | :recorded
 
   @type effect ::
           {:drive, Twist.t(), limits :: [atom()]}
@@ -55,6 +57,8 @@ defmodule Robot.Role do
           | {:answer_saved, GenServer.from() | nil}
           | {:apply, then()}
           | {:apply, then(), more :: [term()]}
+          | {:after, ms :: pos_integer(), message :: term()}
+          | {:disarm, then()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:stage, atom(), map()}
           | {:phase, :idle | {module(), atom()}}
@@ -78,12 +82,16 @@ defmodule Robot.Role do
   @doc "The input of a tick, for a role whose ticks read the board."
   @callback perceive(at_ms :: integer(), state(), Board.t()) :: input()
 
-  @doc "Whether an input that looks like one of its own is whole: asked at the door of its process, not in lockstep."
-  @callback whole?(input()) :: boolean()
+  @doc """
+  An input as the role handles it, with what only a process knows: `now_us` is `System.monotonic_time/1` in microseconds, by
+  which people's orders are dated. `:unknown` is one that looks like an input and is not whole.
+  """
+  @callback arrive(input(), now_us :: integer(), Board.t() | Board.entries()) ::
+              input() | :unknown
 
   @doc "The module of others whose code runs on this input, so that one that hangs is found and named."
   @callback foreign(input(), state()) :: module() | nil
-  @optional_callbacks perceive: 3, foreign: 2, whole?: 1
+  @optional_callbacks perceive: 3, foreign: 2, arrive: 3
 
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::
@@ -91,13 +99,16 @@ defmodule Robot.Role do
 
   @doc "Whether a term is `t:then/0`, which can be applied with so many more arguments."
   @spec then?(term(), more :: non_neg_integer()) :: boolean()
-  def then?(then, more \\ 0),
+  def then?(then, more \\ 0)
+  def then?({:cast, role, _message}, 0) when is_atom(role), do: true
+
+  def then?(then, more),
     do: then in [nil, :recorded] or HardenedServer.callable?(then, more)
 
   @doc "Whether an effect is recorded: what other roles, robots, devices and people notice."
   @spec recorded?(effect()) :: boolean()
   def recorded?(effect),
-    do: elem_or_self(effect) in [:drive, :look, :cast, :send, :stage, :phase, :claim]
+    do: elem_or_self(effect) in [:drive, :look, :cast, :send, :stage, :phase, :claim, :disarm]
 
   defp elem_or_self(effect) when is_tuple(effect), do: elem(effect, 0)
   defp elem_or_self(effect), do: effect
@@ -114,6 +125,7 @@ defmodule Robot.Role do
   def recorded({:ask, _from, message}), do: {:ask, nil, message}
   def recorded({:cast, role, message}), do: {:cast, role, plain(message)}
   def recorded({:cast, message}), do: {:cast, plain(message)}
+  def recorded({:disarm, _then}), do: {:disarm, :recorded}
   def recorded(other), do: other
 
   defp plain({kind, _then}) when kind in [:forget, :latch, :stand, :halt], do: {kind, :recorded}

@@ -8,13 +8,19 @@ defmodule Robot.Trace do
   `Robot.Role.recorded?/1` names.
 
   An entry of the kind `:begin` has the state with which a role starts, also after a crash. One of the kind `:checkpoint`
-  has a function that returns that of now. It is offered at each tick, between two inputs; whoever wants one calls the
+  has a function that returns that of now. It is offered at each tick, or of a role without ticks at each cast, between two inputs; whoever wants one calls the
   function at once, in the process that offers it.
   """
+
+  @roles [:gate, :executive, :pilot, :estop]
 
   @type kind :: :begin | :checkpoint | :input | :effect
   @type entry :: {role :: atom(), kind(), what :: term(), at_ms :: integer()}
   @type state :: Robot.Role.state()
+
+  @doc "The roles that are recorded."
+  @spec roles() :: [atom(), ...]
+  def roles, do: @roles
 
   @doc "Records an input of the process in this role."
   @spec input(Robot.Config.t(), atom(), term(), integer()) :: :ok

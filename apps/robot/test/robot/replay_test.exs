@@ -36,7 +36,7 @@ defmodule Robot.ReplayTest do
   defp recorded(role, state, inputs, from_ms \\ 0) do
     {entries, {state, at_ms}} =
       Enum.flat_map_reduce(inputs, {state, from_ms}, fn input, {state, at_ms} ->
-        {state, effects} = Roles.input(role, state, input, at_ms)
+        {state, effects} = Roles.input(state, input, at_ms)
 
         {[{role, :input, input, at_ms} | for(e <- effects, do: {role, :effect, e, at_ms})],
          {state, at_ms + 50}}

@@ -89,7 +89,7 @@ defmodule Sim.Invariants do
     claims = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
     ids = for {id, _claim} <- claims, do: id
     parts = Radio.parts(trial.radio, ids)
-    stops = for id <- ids, into: %{}, do: {id, trial.members[id].stop}
+    stops = for id <- ids, into: %{}, do: {id, trial.members[id].estop.stop}
     held = for {id, %{held: [_ | _]}} <- stops, do: id
     missions = for id <- ids, mission = trial.members[id].pilot.runner.mission, do: {id, mission}
     bodies = for id <- ids, do: world.robots[id]

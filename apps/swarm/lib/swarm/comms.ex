@@ -56,7 +56,7 @@ defmodule Swarm.Comms do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
     # The e-stop process first: a companion that is listed later restarts with those before it,
     # but never restarts them.
-    companions = config.companions ++ [{EStop, []}, {__MODULE__, options}]
+    companions = config.companions ++ [{EStop, []}, EStop.entry(), {__MODULE__, options}]
 
     %{
       config

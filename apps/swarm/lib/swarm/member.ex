@@ -17,12 +17,12 @@ defmodule Swarm.Member do
 
   Effects: `{:drive, twist}`, `{:look, pan, tilt}`, `{:send, to, message}`, `{:stage, name, map}`.
   """
-  alias Hal.{Pose, Twist}
+  alias Hal.Twist
   alias Robot.Percept
   alias Robot.Control.{Controller, Delivery, Executive, Pilot}
   alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Gate
-  alias Swarm.Comms.CommandHandler
+  alias Swarm.Comms.{CommandHandler, OwnHeartbeat}
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.Receiver
@@ -42,18 +42,17 @@ defmodule Swarm.Member do
                       ])
 
   # The order in which the robot's supervisor starts them: with one that ends, those behind it end.
-  @roles [:gate, :executive, :pilot]
+  @roles [:gate, :executive, :pilot, :estop]
   # When `Robot.Safety.LivenessMonitor` kills what hangs.
   @killed_ms 2_000
 
-  @enforce_keys [:config, :boot, :pilot, :executive, :gate, :receiver]
+  @enforce_keys [:config, :boot, :pilot, :executive, :gate, :estop, :receiver]
   defstruct @enforce_keys ++
-              [stop: %EStop.State{}, entries: %{}, sequence: 0, beat_ms: nil, hung: %{}]
+              [entries: %{}, sequence: 0, beat_ms: nil, hung: %{}]
 
   @typedoc """
   `config` is what it was started with, its mission that which a start begins; `entries` holds the last
-  readings by name, with their times; `receiver` holds what was heard: peers, rejected messages;
-  `stop` is the state of the emergency stop.
+  readings by name, with their times; `receiver` holds what was heard: peers, rejected messages.
   """
   @type t :: %__MODULE__{
           config: Robot.Config.t(),
@@ -61,8 +60,8 @@ defmodule Swarm.Member do
           pilot: Pilot.t(),
           executive: Executive.t(),
           gate: Gate.t(),
+          estop: EStop.t(),
           receiver: Receiver.t(),
-          stop: EStop.State.t(),
           entries: %{atom() => {term(), integer()}},
           sequence: non_neg_integer(),
           beat_ms: integer() | nil,
@@ -79,7 +78,7 @@ defmodule Swarm.Member do
           | {:command, term(), integer()}
           | {:tick, integer()}
           | {:reflex, integer()}
-          | {:crash, :gate | :executive | :pilot, integer()}
+          | {:crash, :gate | :executive | :pilot | :estop, integer()}
           | {:hang, {:executive | :pilot, until_ms :: integer()}, integer()}
 
   @type effect ::
@@ -101,11 +100,13 @@ defmodule Swarm.Member do
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
     given = Keyword.take(options, [:id, :profile, :start, :plan])
     devices = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}]
-    config = struct!(Robot.Config, given ++ devices ++ [mission: options[:mission]])
+    life = [mission: options[:mission], boot: options[:boot]]
+    config = struct!(Robot.Config, given ++ devices ++ life)
     entries = %{arming: {%{state: :armed, why: nil}, 0}}
     {gate, _started} = Gate.init(config, entries, 0)
     {executive, _started} = Executive.init(config, entries, 0)
     {pilot, _started} = Pilot.init(config, entries, 0)
+    {estop, _started} = EStop.init(config, entries, 0)
     runner = Runner.new(options[:id], Controller.walls(executive.controller))
     {runner, []} = Runner.start(runner, module, mission_options)
 
@@ -115,6 +116,7 @@ defmodule Swarm.Member do
       pilot: %{pilot | runner: runner, state: Runner.state(runner), options: mission_options},
       executive: executive,
       gate: gate,
+      estop: estop,
       entries: entries,
       receiver: Receiver.new(options[:id])
     }
@@ -143,29 +145,14 @@ defmodule Swarm.Member do
 
   def step(member, {:message, term, at_ms}), do: hear(member, Message.check(term), at_ms)
 
-  def step(member, {:command, :estop, at_ms}),
-    do: latch(member, EStop.State.press(member.stop, {member.config.id, 0, at_ms}), at_ms)
-
-  def step(member, {:command, {:estop, call}, at_ms}),
-    do: latch(member, EStop.State.call(member.stop, call), at_ms)
-
-  def step(member, {:command, :reset, at_ms}),
-    do: gate(%{member | stop: EStop.State.reset(member.stop)}, {:ask, nil, :reset}, at_ms)
-
-  # A command that is accepted while all robots are stopped would begin with the reset.
-  def step(%{stop: %{held: [_ | _]}} = member, {:command, command, _at_ms})
-      when command != :stop,
-      do: {member, []}
-
-  # The mission does not get to interpret it, as in `Robot.Control.Pilot`.
-  def step(member, {:command, :stop, at_ms}), do: halt(member, at_ms)
-
   def step(member, {:command, command, at_ms}) do
-    with {:ok, ways} <- ways(command, member) do
+    with false <- EStop.takes?(command),
+         {:ok, ways} <- ways(command, member) do
       event = {:command, CommandHandler.command(command)}
       delivery = %Delivery{ways: ways, until_ms: :infinity, reply: nil}
       pilot(member, {:cast, {:deliver, delivery, event}}, at_ms)
     else
+      true -> estop(member, {:command, command, nil, {:asked, 1_000 * at_ms}}, at_ms)
       {:error, _line} -> {member, []}
     end
   end
@@ -204,7 +191,7 @@ defmodule Swarm.Member do
   @doc "Who called the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
   @spec held(t()) :: [String.t()] | nil
   def held(member),
-    do: if(EStop.State.held?(member.stop), do: EStop.State.callers(member.stop))
+    do: if(EStop.State.held?(member.estop.stop), do: EStop.State.callers(member.estop.stop))
 
   @doc "Whether the mission lets the robot stand and wait, for a round, a leader or a person."
   @spec stands?(t()) :: boolean()
@@ -235,13 +222,16 @@ defmodule Swarm.Member do
   defp behind(role), do: Enum.drop_while(@roles, &(&1 != role))
 
   defp begin(role, member, at_ms) do
-    {state, effects} = module(role).init(member.config, member.entries, at_ms)
+    {state, effects} =
+      module(role).init(%{member.config | boot: member.boot}, member.entries, at_ms)
+
     carry(effects, Map.put(member, role, state), at_ms)
   end
 
   defp module(:gate), do: Gate
   defp module(:executive), do: Executive
   defp module(:pilot), do: Pilot
+  defp module(:estop), do: EStop
 
   # What has waited is handed on in its order; what has hung for too long was killed meanwhile.
   defp recovered(member, at_ms) do
@@ -279,11 +269,20 @@ defmodule Swarm.Member do
   defp heard(member, :nothing, _at_ms), do: {member, []}
 
   defp heard(member, {:heartbeat, _id, beat}, at_ms),
-    do: latch(member, EStop.State.hear(member.stop, beat.estop), at_ms)
+    do:
+      if(EStop.news?(member.estop.stop, beat.estop),
+        do: estop(member, {:beat, beat.estop}, at_ms),
+        else: {member, []}
+      )
 
   defp gate(member, input, at_ms), do: hand(:gate, member, input, at_ms)
   defp executive(member, input, at_ms), do: hand(:executive, member, input, at_ms)
   defp pilot(member, input, at_ms), do: hand(:pilot, member, input, at_ms)
+
+  defp estop(member, message, at_ms) do
+    input = EStop.arrive({:cast, message}, 1_000 * at_ms, member.entries)
+    hand(:estop, member, input, at_ms)
+  end
 
   defp hand(role, %{hung: hung} = member, input, _at_ms) when is_map_key(hung, role) do
     {until_ms, killed_ms, waiting} = hung[role]
@@ -328,13 +327,20 @@ defmodule Swarm.Member do
   defp carry_one({:cast, :pilot, message}, member, at_ms),
     do: back(pilot(member, {:cast, message}, at_ms))
 
+  defp carry_one({:cast, :estop, message}, member, at_ms),
+    do: back(estop(member, message, at_ms))
+
+  defp carry_one({:apply, {:cast, _role, _message} = cast}, member, at_ms),
+    do: carry_one(cast, member, at_ms)
+
   defp carry_one({:send, to, body}, member, _at_ms),
     do: {[{:send, to, Message.of(member.config.id, body)}], member}
 
   defp carry_one({:stage, _name, _facts} = stage, member, _at_ms), do: {[stage], member}
-  # Of what is put on the board the gate reads its own again, when it begins anew.
-  defp carry_one({:put, key, value}, member, at_ms) when key in [:frame, :presses],
-    do: {[], put(member, key, value, at_ms)}
+  # What of the board others read, and what roles read of their own when they begin anew.
+  defp carry_one({:put, key, value}, member, at_ms)
+       when key in [:frame, :presses, :pose, :mission, :estop, :stopped, :followed],
+       do: {[], put(member, key, value, at_ms)}
 
   defp carry_one({:latch, set?}, member, at_ms), do: {[], put(member, :latch, set?, at_ms)}
   defp carry_one(:tick, member, at_ms), do: back(gate(member, :tick, at_ms))
@@ -366,43 +372,13 @@ defmodule Swarm.Member do
     )
   end
 
-  # An e-stop spreads with every heartbeat. The mission ends with it: after the reset nothing
-  # moves until somebody gives a command.
-  defp latch(
-         %{stop: %{held: []}} = member,
-         %{held: [_ | _]} = stop,
-         at_ms
-       ) do
-    {member, stopped} = gate(%{member | stop: stop}, {:cast, {:latch, nil}}, at_ms)
-    {member, forgotten} = halt(member, at_ms)
-    {member, stopped ++ forgotten}
-  end
-
-  defp latch(member, stop, _at_ms), do: {%{member | stop: stop}, []}
-
-  # To all at once, as `Robot.Control.Pilot.halt_at_once/2`: one that hangs does not delay the others.
-  defp halt(member, at_ms) do
-    {member, stopped} = gate(member, {:cast, {:forget, nil}}, at_ms)
-    {member, held} = executive(member, {:cast, :hold}, at_ms)
-    {member, ended} = pilot(member, {:cast, {:halt, nil}}, at_ms)
-    {member, stopped ++ held ++ ended}
-  end
-
   defp beat(member, at_ms) do
+    from = {member.boot, member.sequence + 1}
+
     with true <- Heartbeat.due?(member.beat_ms, at_ms),
-         %Percept{pose: %Pose{}} = percept <- Controller.percept(member.executive.controller) do
-      heard = Peers.heard(member.receiver.peers, at_ms)
-      sender = {member.boot, member.sequence + 1}
-
-      claim =
-        if Runner.state(member.pilot.runner) == :idle,
-          do: :idle,
-          else: {member.pilot.runner.module, claim(member)}
-
-      beat = Heartbeat.new(sender, percept, claim, heard, member.stop)
-
-      {%{member | sequence: member.sequence + 1, beat_ms: at_ms},
-       [{:send, :all, Message.new(member.config.id, :heartbeat, beat)}]}
+         {:ok, message} <-
+           OwnHeartbeat.message(member.config, member.entries, member.receiver, from, at_ms) do
+      {%{member | sequence: member.sequence + 1, beat_ms: at_ms}, [{:send, :all, message}]}
     else
       _not_due_or_lost -> {member, []}
     end

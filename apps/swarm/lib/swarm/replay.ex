@@ -73,7 +73,7 @@ defmodule Swarm.Replay do
       percept: Controller.percept(member.executive.controller),
       wishes: Controller.wishes(before.executive.controller, percept),
       driving: with({driving, _at_ms} <- member.entries[:driving], do: driving),
-      stopped?: member.stop.held != [],
+      stopped?: member.estop.stop.held != [],
       before: Runner.explain(before.pilot.runner),
       mission: Runner.explain(member.pilot.runner),
       effects: effects

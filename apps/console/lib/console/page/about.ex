@@ -65,7 +65,7 @@ defmodule Console.Page.About do
         limits: Controller.limits(controller) ++ (percept.driving || %{limits: []}).limits,
         power: percept.power,
         offline: [],
-        estop: member.stop.held != [],
+        estop: member.estop.stop.held != [],
         sonar: sonar(member.config.id, percept.sonar),
         seen: nil,
         camera: false,

@@ -133,9 +133,13 @@ defmodule Robot.Control.Executive do
   def perceive(at_ms, s, board), do: {:tick, Percept.Snapshot.take(board, s.profile, at_ms)}
 
   @impl Role
-  def whole?({:ask, _from, {:goal, _tag, _goal} = order}), do: Inbox.order?(order)
-  def whole?({:cast, {:obey, order}}), do: Inbox.order?(order)
-  def whole?(_other), do: true
+  def arrive({:ask, _from, {:goal, _tag, _goal} = order} = input, _now_us, _board),
+    do: if(Inbox.order?(order), do: input, else: :unknown)
+
+  def arrive({:cast, {:obey, order}} = input, _now_us, _board),
+    do: if(Inbox.order?(order), do: input, else: :unknown)
+
+  def arrive(input, _now_us, _board), do: input
 
   @impl Role
   def handle({:tick, %Percept{} = raw}, _at_ms, s, _board), do: tick(s, raw)

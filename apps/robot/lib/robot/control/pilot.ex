@@ -173,8 +173,10 @@ defmodule Robot.Control.Pilot do
   def foreign(_input, %{runner: %{module: module}}), do: module
 
   @impl Role
-  def whole?({:cast, {:deliver, delivery, _event}}), do: Inbox.delivery?(delivery)
-  def whole?(_other), do: true
+  def arrive({:cast, {:deliver, delivery, _event}} = input, _now_us, _board),
+    do: if(Inbox.delivery?(delivery), do: input, else: :unknown)
+
+  def arrive(input, _now_us, _board), do: input
 
   @impl Role
   def handle({:ask, from, :start}, _at_ms, %{mission: nil} = s, _board),

@@ -14,7 +14,7 @@ defmodule Robot.Recorder.Queue do
 
   # 20 s of a gate that hears much.
   @bound 2_000
-  @roles [gate: 0, executive: 3, pilot: 6]
+  @roles Trace.roles() |> Enum.with_index() |> Enum.map(fn {role, k} -> {role, 3 * k} end)
   @known Map.new(@roles)
   @waiting 1
   @lost 2
@@ -27,7 +27,7 @@ defmodule Robot.Recorder.Queue do
   @doc "A queue for at most `bound` entries of each role."
   @spec new(pos_integer()) :: t()
   def new(bound \\ @bound) do
-    queue = %__MODULE__{counters: :atomics.new(9, signed: true), bound: bound}
+    queue = %__MODULE__{counters: :atomics.new(3 * length(@roles), signed: true), bound: bound}
     ask(queue)
     queue
   end
@@ -41,7 +41,8 @@ defmodule Robot.Recorder.Queue do
   a checkpoint only if one is wanted. Called in the process of the entry's role.
   """
   @spec send_entry(t(), pid(), robot :: atom(), Trace.entry()) :: :ok
-  def send_entry(queue, recorder, robot, {role, :checkpoint, state, at_ms}) do
+  def send_entry(queue, recorder, robot, {role, :checkpoint, state, at_ms})
+      when is_map_key(@known, role) do
     if get(queue, role, @due) == 1 and room?(queue, role) do
       put(queue, role, @due, 0)
       deliver(queue, recorder, robot, {role, :checkpoint, state.(), at_ms})

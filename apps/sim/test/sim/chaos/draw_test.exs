@@ -60,7 +60,8 @@ defmodule Sim.Chaos.DrawTest do
 
     events = for run <- runs, {_at_s, event} <- run[:script], uniq: true, do: elem(event, 0)
 
-    assert Enum.sort(events) == [:blind, :deaf, :estop, :freeze, :loss, :reset, :tell]
+    assert Enum.sort(events) ==
+             [:blind, :crash, :deaf, :estop, :freeze, :hang, :loss, :reset, :tell]
 
     cuts = for run <- runs, {_from_s, to_s, what} <- run[:cuts], do: {to_s, what}
     assert Enum.any?(cuts, &match?({:end, _what}, &1))

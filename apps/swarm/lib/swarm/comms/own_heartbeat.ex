@@ -1,6 +1,6 @@
 defmodule Swarm.Comms.OwnHeartbeat do
   @moduledoc false
-  # Makes the heartbeat of a live robot from its board. `Swarm.Member` makes the same in lockstep.
+  # Makes a robot's heartbeat from its board, live and in lockstep.
   alias Robot.Board
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
@@ -16,7 +16,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   """
   @spec message(
           Robot.Config.t(),
-          Board.t(),
+          Board.t() | Board.entries(),
           Receiver.t(),
           {integer(), non_neg_integer()},
           integer()
@@ -39,7 +39,7 @@ defmodule Swarm.Comms.OwnHeartbeat do
   end
 
   defp claim(board, at_ms) do
-    case Board.fetch(board, :mission, :infinity) do
+    case Board.fetch(board, :mission, :infinity, at_ms) do
       {:ok, %{state: :idle}, _at_ms} ->
         :idle
 

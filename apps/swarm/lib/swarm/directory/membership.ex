@@ -19,10 +19,11 @@ defmodule Swarm.Directory.Membership do
   @retry_ms 100
   @longest_retry_ms 5_000
 
-  @enforce_keys [:groups, :token]
+  @enforce_keys [:pid, :groups, :token]
   defstruct @enforce_keys ++ [scope: nil, retry_ms: @retry_ms, left?: false]
 
   @type t :: %__MODULE__{
+          pid: pid(),
           groups: [Directory.group()],
           token: reference(),
           scope: reference() | nil,
@@ -30,9 +31,10 @@ defmodule Swarm.Directory.Membership do
           left?: boolean()
         }
 
-  @doc "Adds the calling process to these groups, now or as soon as there is a directory."
-  @spec enter([Directory.group()]) :: t()
-  def enter(groups), do: try_to(%__MODULE__{groups: groups, token: make_ref()})
+  @doc "Adds a process of this node to these groups, by default the calling one, now or as soon as there is a directory."
+  @spec enter([Directory.group()], pid()) :: t()
+  def enter(groups, pid \\ self()),
+    do: try_to(%__MODULE__{pid: pid, groups: groups, token: make_ref()})
 
   @doc "Whether the process is in its groups now."
   @spec in?(t()) :: boolean()
@@ -44,7 +46,7 @@ defmodule Swarm.Directory.Membership do
 
   def leave(entry) do
     if entry.scope, do: Process.demonitor(entry.scope, [:flush])
-    Directory.leave(self(), entry.groups)
+    Directory.leave(entry.pid, entry.groups)
     %{entry | scope: nil, left?: true}
   end
 
@@ -61,7 +63,7 @@ defmodule Swarm.Directory.Membership do
   defp try_to(entry) do
     scope = Directory.monitor()
 
-    case Directory.enter(self(), entry.groups) do
+    case Directory.enter(entry.pid, entry.groups) do
       :ok ->
         %{entry | scope: scope, retry_ms: @retry_ms}
 

@@ -1,23 +1,13 @@
 defmodule Swarm.EStop.Answer do
   @moduledoc false
-  # Answers for a gate that has carried out a stop, to the e-stop process or to the caller.
+  # Answers the caller of a stop for a gate that has carried it out.
   alias Hal.Device
   alias Robot.{Board, Names}
-  alias Robot.Safety.{Gate, Readiness}
+  alias Robot.Safety.Readiness
   alias Mesh.Nonblocking
-
-  @doc """
-  Called by the gate when the robot's mission or order has ended: it may be released by the reset
-  that was given at `given_us`, if its sender still waits for `ref`, and if nobody has stopped the
-  robot since the state that `pressed` identifies.
-  """
-  @spec release(atom(), pressed :: reference(), {reference(), given_us :: integer()}) :: :ok
-  def release(robot, pressed, {ref, given_us}),
-    do: GenServer.cast(Names.via(robot, :estop), {:release, pressed, ref, given_us})
 
   # Its base reports ten times a second; the caller waits for half a second (`Swarm.Commands.Client`).
   @report_ms 300
-  @saved_ms 400
 
   @doc """
   Called by the gate when the robot's mission or order has ended and the gate has stopped: answers whether the wheels
@@ -26,17 +16,7 @@ defmodule Swarm.EStop.Answer do
   @spec stood(atom(), reference()) :: :ok
   def stood(robot, ref), do: confirm(robot, {Nonblocking, :answer, [ref]})
 
-  @doc """
-  The same for an e-stop, once the gate is latched: `:ok` also says that the latch is in its file, if it has one. If gate
-  or disk take too long, `{:unsaved, ref}` comes to the e-stop process (the caller) in time for `unsaved/3`.
-  """
-  @spec held(atom(), reference()) :: :ok
-  def held(robot, ref) do
-    Process.send_after(self(), {:unsaved, ref}, @saved_ms)
-    Gate.latch(robot, {__MODULE__, :latched, [robot, ref]})
-  end
-
-  @doc "Called by the gate when it is latched."
+  @doc "The same for an e-stop, when the gate is latched: `:ok` also says that the latch is in its file, if it has one."
   @spec latched(atom(), reference()) :: :ok
   def latched(robot, ref), do: confirm(robot, {__MODULE__, :save, [robot, ref]})
 
@@ -60,8 +40,10 @@ defmodule Swarm.EStop.Answer do
   end
 
   @doc "Answers an e-stop that took too long; nobody hears it after another answer."
-  @spec unsaved(atom(), Board.t(), reference()) :: :ok
-  def unsaved(robot, board, ref) do
+  @spec unsaved(atom(), reference()) :: :ok
+  def unsaved(robot, ref) do
+    board = Board.find!(robot)
+
     cond do
       not Board.latched?(board) ->
         why = "its gate does not answer, and the drive stops by itself if nothing comes from it"
@@ -99,11 +81,6 @@ defmodule Swarm.EStop.Answer do
     "#{robot}: its gate stands, but #{why}: nobody can say whether its wheels do; " <>
       "use the robot's own emergency stop"
   end
-
-  @doc "Answers that a reset was not carried out, because the robot was stopped again after it was given."
-  @spec stopped_again(atom(), reference()) :: :ok
-  def stopped_again(robot, ref),
-    do: Nonblocking.answer(ref, {:error, "#{robot} was stopped again meanwhile; reset it again"})
 
   # Whether a stop of the gate can reach the wheels.
   defp stopped(robot) do

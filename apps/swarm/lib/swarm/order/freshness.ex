@@ -123,6 +123,16 @@ defmodule Swarm.Order.Freshness do
 
   def check(_life, _order, _now_us, _stopped_us), do: {:error, :unknown}
 
+  @doc """
+  An order as it counts where it arrived: a time without a stamp only from this node (`here?`).
+
+      iex> for here? <- [true, false], do: Swarm.Order.Freshness.arrived({:asked, 7}, here?)
+      [{:asked, 7}, nil]
+  """
+  @spec arrived(order :: term(), here? :: boolean()) :: term()
+  def arrived({:asked, _at_us}, false), do: nil
+  def arrived(order, _here?), do: order
+
   @doc "The answer of a robot to an order that it does not obey."
   @spec refusal(robot :: atom(), refusal()) :: {:error, String.t()}
   def refusal(robot, :stopped),

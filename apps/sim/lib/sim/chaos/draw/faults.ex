@@ -21,7 +21,16 @@ defmodule Sim.Chaos.Draw.Faults do
         {robot, random} = Random.pick(random, robots)
 
         {kind, random} =
-          Random.weighted(random, freeze: 4, blind: 3, deaf: 3, loss: 2, estop: 2, shape: 2)
+          Random.weighted(random,
+            freeze: 4,
+            blind: 3,
+            deaf: 3,
+            crash: 3,
+            hang: 3,
+            loss: 2,
+            estop: 2,
+            shape: 2
+          )
 
         script(kind, at_s, if(leader?, do: :leader, else: robot), loss, random)
       end)
@@ -32,6 +41,17 @@ defmodule Sim.Chaos.Draw.Faults do
   defp script(kind, at_s, who, _loss, random) when kind in [:freeze, :blind, :deaf] do
     {for_s, random} = Random.number(random, 0.5, 12.0, 1)
     {[{at_s, {kind, who, for_s}}], random}
+  end
+
+  defp script(:crash, at_s, who, _loss, random) do
+    {role, random} = Random.pick(random, [:gate, :executive, :pilot, :estop])
+    {[{at_s, {:crash, who, role}}], random}
+  end
+
+  defp script(:hang, at_s, who, _loss, random) do
+    {role, random} = Random.pick(random, [:executive, :pilot])
+    {for_s, random} = Random.number(random, 0.2, 3.0, 1)
+    {[{at_s, {:hang, who, role, for_s}}], random}
   end
 
   defp script(:loss, at_s, _who, loss, random) do
