@@ -9,6 +9,7 @@ defmodule Bench.Explore do
   alias Robot.Navigation.Grid
   alias Sim.Trial
   alias Sim.Trial.Coverage
+  alias Swarm.Member
 
   @share 0.95
   # A wall on the map that is so near to a true one (metres) is one.
@@ -73,7 +74,7 @@ defmodule Bench.Explore do
 
     off =
       for id <- Trial.living(trial) do
-        believed = Trial.robot(trial, id).executive.controller.percept.pose
+        believed = Member.role(Trial.robot(trial, id), :executive).controller.percept.pose
         Pose.distance(believed, Sim.World.truth(trial.world, id))
       end
 

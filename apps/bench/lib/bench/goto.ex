@@ -7,6 +7,7 @@ defmodule Bench.Goto do
   alias Robot.Navigation.{Grid, Reach}
   alias Sim.Trial
   alias Sim.Trial.Setup
+  alias Swarm.Member
 
   # It counts as there if it truly is so near to the goal (metres): 0.1 is what it aims at by its own estimate.
   @there_m 0.5
@@ -143,7 +144,7 @@ defmodule Bench.Goto do
   defp go(trial, kind, limit_ms) do
     trial = Trial.step(trial)
 
-    case Trial.robot(trial, kind).pilot.runner do
+    case Member.runner(Trial.robot(trial, kind)) do
       %{phase: :done} -> {trial, :done}
       %{phase: :given_up, claim: %{blocked_by: why}} -> {trial, {:given_up, why}}
       _under_way -> go(trial, kind, limit_ms)

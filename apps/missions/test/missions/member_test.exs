@@ -160,7 +160,7 @@ defmodule Swarm.MemberTest do
       before = member()
       later = hear(before, term)
       assert later.receiver.rejected == %{reason => 1}, inspect(term, limit: 5)
-      assert later.pilot.runner == before.pilot.runner
+      assert later.lockstep.roles.pilot.runner == before.lockstep.roles.pilot.runner
     end
   end
 
@@ -173,25 +173,25 @@ defmodule Swarm.MemberTest do
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do
     {one, _} = Member.step(member(), {:command, :estop, 0})
-    assert [_tag] = one.estop.stop.held
+    assert [_tag] = one.lockstep.roles.estop.stop.held
 
-    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.estop.stop.held})
+    pressed = Message.new(:mag2, :heartbeat, %{@beat | estop: one.lockstep.roles.estop.stop.held})
 
     two = hear(member(:mag3), pressed)
-    assert two.estop.stop.held == one.estop.stop.held
-    assert sense(two, 100).pilot.runner.phase == :idle
+    assert two.lockstep.roles.estop.stop.held == one.lockstep.roles.estop.stop.held
+    assert sense(two, 100).lockstep.roles.pilot.runner.phase == :idle
     {_, [{:drive, twist}]} = Member.step(two, {:reflex, 100})
     assert Twist.zero?(twist)
 
     # A person resets it; the neighbour, not reset yet, repeats the old number.
     {two, _} = Member.step(two, {:command, :reset, 200})
     two = hear(two, put_in(pressed.body.sequence, 2), 300)
-    assert two.estop.stop.held == []
+    assert two.lockstep.roles.estop.stop.held == []
 
     # The next stop is another one, and counts.
     {two, _} = Member.step(two, {:command, :estop, 400})
-    assert [tag] = two.estop.stop.held
-    assert tag not in one.estop.stop.held
+    assert [tag] = two.lockstep.roles.estop.stop.held
+    assert tag not in one.lockstep.roles.estop.stop.held
   end
 
   defmodule Deaf do
@@ -214,7 +214,10 @@ defmodule Swarm.MemberTest do
     assert v > 0
 
     {stopped, []} = Member.step(rolling, {:command, :stop, 200})
-    assert %{phase: :idle, module: nil, mission: nil, claim: claim} = stopped.pilot.runner
+
+    assert %{phase: :idle, module: nil, mission: nil, claim: claim} =
+             stopped.lockstep.roles.pilot.runner
+
     assert claim == %{}
     assert Member.stands?(stopped)
     assert stands?(stopped, 200)
@@ -238,8 +241,8 @@ defmodule Swarm.MemberTest do
       {crashed, effects} = Member.step(rolling(), {:crash, role, 250})
       # Executive and pilot make the gate drop the wish, which is told to the wheels at once.
       assert List.last(for {:drive, twist} <- effects, do: twist) |> Twist.zero?()
-      assert %{state: :idle} = crashed.pilot
-      assert crashed.boot == 2
+      assert %{state: :idle} = crashed.lockstep.roles.pilot
+      assert crashed.lockstep.config.boot == 2
       crashed = crashed |> sense(300) |> sense(400)
       assert stands?(crashed, 400)
       {started, []} = Member.step(crashed, {:command, :start, 500})
@@ -252,7 +255,7 @@ defmodule Swarm.MemberTest do
     {held, _} = Member.step(held, {:crash, :gate, 300})
     assert {held, [{:drive, twist}]} = Member.step(held, {:reflex, 350})
     assert Twist.zero?(twist)
-    assert %{driving: {%{limits: [:estop]}, 350}} = held.entries
+    assert %{driving: {%{limits: [:estop]}, 350}} = held.lockstep.board
     {free, _} = Member.step(held, {:command, :reset, 400})
     {free, _} = Member.step(free, {:command, :start, 450})
     refute free |> sense(500) |> sense(600) |> stands?(600)
@@ -265,11 +268,11 @@ defmodule Swarm.MemberTest do
     assert stands?(hung, 900)
     well = hung |> sense(1_000) |> sense(1_100)
     refute stands?(well, 1_100)
-    assert {Deaf, _phase} = well.pilot.state
+    assert {Deaf, _phase} = well.lockstep.roles.pilot.state
 
     {hung, []} = Member.step(rolling(), {:hang, {:executive, 60_000}, 250})
     killed = Enum.reduce(300..2_400//100, hung, &sense(&2, &1))
-    assert %{state: :idle} = killed.pilot
+    assert %{state: :idle} = killed.lockstep.roles.pilot
     assert stands?(killed, 2_400)
   end
 
@@ -280,7 +283,7 @@ defmodule Swarm.MemberTest do
     {stopped, _} = Member.step(hung, {:command, :stop, 350})
     stopped = Enum.reduce(400..1_500//100, stopped, &sense(&2, &1))
     assert stands?(stopped, 1_500)
-    assert %{state: :idle} = stopped.pilot
+    assert %{state: :idle} = stopped.lockstep.roles.pilot
   end
 
   defp stands?(member, at_ms) do
@@ -297,7 +300,7 @@ defmodule Swarm.MemberTest do
     {member, [{:drive, _}]} = Member.step(sense(member, 200), {:reflex, 200})
     assert {member, [{:drive, %Twist{linear: still}}]} = Member.step(member, touch)
     assert still == 0.0
-    assert %{driving: {%{limits: limits}, 220}} = member.entries
+    assert %{driving: {%{limits: limits}, 220}} = member.lockstep.board
     assert :bumper in limits
   end
 
@@ -348,7 +351,7 @@ defmodule Swarm.MemberTest do
 
     picture = &{:detections, %Vision.Detections{at_ms: &1, blobs: [blob]}}
     {searches, []} = member() |> sense(100) |> Member.step(picture.(200))
-    assert %{phase: :search} = searches.pilot.runner
+    assert %{phase: :search} = searches.lockstep.roles.pilot.runner
     evaluated = {Robot.Percept.Sighting, :bearing, 3}
     cautious = {Robot.Behaviour.Avoid.Caution, :check, 3}
 
@@ -390,8 +393,11 @@ defmodule Swarm.MemberTest do
     {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
     {stopped, []} = Member.step(member, {:command, :stop, 100})
     {started, []} = Member.step(stopped, {:command, :start, 200})
-    assert %{formation: {:wedge, 1.2}, started?: true} = started.pilot.runner.mission
-    assert sense(started, 300).pilot.runner.phase == :search
+
+    assert %{formation: {:wedge, 1.2}, started?: true} =
+             started.lockstep.roles.pilot.runner.mission
+
+    assert sense(started, 300).lockstep.roles.pilot.runner.phase == :search
   end
 
   test "while it is stopped, it accepts no command but stop" do

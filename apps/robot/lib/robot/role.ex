@@ -1,7 +1,7 @@
 defmodule Robot.Role do
   @moduledoc """
   A part of a robot as a pure machine: the only place where its rules stand. `Robot.Host` carries it out as a process, and
-  `Swarm.Member` in lockstep. A role never calls, waits, reads a clock or sends by itself.
+  `Robot.Lockstep` in simulation. A role never calls, waits, reads a clock or sends by itself.
 
   | input | what arrives |
   |---|---|

@@ -142,7 +142,7 @@ defmodule Robot.MissionCase do
         do: {id, :erts_debug.flat_size(mission_of(trial, id))}
       )
 
-  defp mission_of(trial, id), do: Trial.robot(trial, id).pilot.runner.mission
+  defp mission_of(trial, id), do: Member.runner(Trial.robot(trial, id)).mission
 
   defp junk(%{trial: trial, letters: letters}) do
     [id | _] = Trial.living(trial)
@@ -153,7 +153,7 @@ defmodule Robot.MissionCase do
     changed =
       for term <- [:junk, {:message, 1}, %{from: :mag2}, nil] ++ Enum.map(others, &said/1),
           {heard, effects} = Member.step(member, {:message, term, trial.at_ms}),
-          heard.pilot.runner.mission != member.pilot.runner.mission or effects != [],
+          Member.runner(heard).mission != Member.runner(member).mission or effects != [],
           do: "#{inspect(term, limit: 8)} from another robot changes it"
 
     # Some of these may be allowed; they must not end it.
@@ -183,7 +183,8 @@ defmodule Robot.MissionCase do
     rested = steps(stopped, @rest_ticks)
 
     states =
-      for id <- Trial.living(rested), do: {id, Runner.state(Trial.robot(rested, id).pilot.runner)}
+      for id <- Trial.living(rested),
+          do: {id, Runner.state(Member.runner(Trial.robot(rested, id)))}
 
     running =
       for {id, state} <- states, state != :idle, do: "#{id} is #{inspect(state)} after a stop"
@@ -198,7 +199,7 @@ defmodule Robot.MissionCase do
 
     idle =
       for id <- Trial.living(begun),
-          not match?({^module, _phase}, Runner.state(Trial.robot(begun, id).pilot.runner)),
+          not match?({^module, _phase}, Runner.state(Member.runner(Trial.robot(begun, id)))),
           do: "#{id} does not start again"
 
     running ++ moving ++ idle

@@ -26,6 +26,7 @@ defmodule Sim.Invariants do
   alias Sim.Invariants.{Attempt, Leaders, Limits, Slots, Stops, Violation, Withdrawals}
   alias Sim.{Radio, Trial}
   alias Sim.Trial.{Claims, Faults, Stuck}
+  alias Swarm.Member
 
   @names [:two_leaders, :same_epoch, :two_majorities, :not_together, :no_leader] ++
            [:same_slot, :bad_anchor, :too_fast, :too_abrupt, :stop_ignored, :stop_lost] ++
@@ -89,9 +90,12 @@ defmodule Sim.Invariants do
     claims = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
     ids = for {id, _claim} <- claims, do: id
     parts = Radio.parts(trial.radio, ids)
-    stops = for id <- ids, into: %{}, do: {id, trial.members[id].estop.stop}
+    stops = for id <- ids, into: %{}, do: {id, Member.role(trial.members[id], :estop).stop}
     held = for {id, %{held: [_ | _]}} <- stops, do: id
-    missions = for id <- ids, mission = trial.members[id].pilot.runner.mission, do: {id, mission}
+
+    missions =
+      for id <- ids, mission = Member.runner(trial.members[id]).mission, do: {id, mission}
+
     bodies = for id <- ids, do: world.robots[id]
 
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, parts)

@@ -14,7 +14,7 @@ defmodule Robot.MissionCaseTest do
     distinct = fn trial ->
       points =
         for id <- Sim.Trial.living(trial),
-            do: Sim.Trial.robot(trial, id).pilot.runner.mission.motivation.active
+            do: Swarm.Member.runner(Sim.Trial.robot(trial, id)).mission.motivation.active
 
       if Enum.all?(points, &(&1 in [nil | Enum.to_list(0..7)])),
         do: :ok,

@@ -12,7 +12,7 @@ defmodule Sim.ExploreTest do
 
   defp run(trial), do: if(Trial.done?(trial), do: trial, else: run(Trial.step(trial)))
 
-  defp map(trial, id), do: Trial.robot(trial, id).pilot.runner.mission.map
+  defp map(trial, id), do: Swarm.Member.runner(Trial.robot(trial, id)).mission.map
 
   @tag :slow
   test "one robot explores the hall, and says so" do

@@ -276,7 +276,13 @@ defmodule Sim.InvariantsTest do
         judge =
           Enum.reduce(1..80, Invariants.new(trial), fn k, judge ->
             formed? = k > 10 and k <= 10 + ticks
-            trial = put_in(trial.members[:mag1].pilot.runner.claim, %{formed | formed: formed?})
+
+            trial =
+              put_in(trial.members[:mag1].lockstep.roles.pilot.runner.claim, %{
+                formed
+                | formed: formed?
+              })
+
             Invariants.note(judge, %{trial | at_ms: 100 * k})
           end)
 
@@ -294,7 +300,7 @@ defmodule Sim.InvariantsTest do
       claim = %{phase: :lead, leader: :mag1, epoch: 1, sight: nil}
 
       leading = fn trial, id ->
-        put_in(trial.members[id].pilot.runner.claim, %{claim | leader: id})
+        put_in(trial.members[id].lockstep.roles.pilot.runner.claim, %{claim | leader: id})
       end
 
       trial = %{(trial |> leading.(:mag1) |> leading.(:mag2)) | at_ms: 1_000}

@@ -16,7 +16,8 @@ defmodule Sim.PatrolTest do
 
   defp points, do: Patrol.Options.points(Options.defaults(Patrol.Options.table()))
 
-  defp active(trial, id), do: Trial.robot(trial, id).pilot.runner.mission.motivation.active
+  defp active(trial, id),
+    do: Swarm.Member.runner(Trial.robot(trial, id)).mission.motivation.active
 
   # The longest time that each point was out of sight, and the run, after so many seconds. A robot that is less sure of its
   # pose than it is near the point sees it from a little farther.
@@ -120,7 +121,10 @@ defmodule Sim.PatrolTest do
     script = [{5.0, {:tell, :all, "start:patrol:loop=line"}}]
     {:ok, trial} = Trial.new(%{robots: [:mag1, :mag2], blobs: :direct, script: script})
     trial = Enum.reduce(1..100, trial, fn _, trial -> Trial.step(trial) end)
-    for id <- [:mag1, :mag2], do: assert(Trial.robot(trial, id).pilot.runner.module == Patrol)
+
+    for id <- [:mag1, :mag2],
+        do: assert(Swarm.Member.runner(Trial.robot(trial, id)).module == Patrol)
+
     assert {:error, line} = Trial.new(%{script: [{5.0, {:tell, :all, "start:patorl"}}]})
     assert line =~ "did you mean patrol?"
   end

@@ -292,7 +292,7 @@ defmodule Sim.ProcessesTest do
         Map.update!(compared, elem(effect, 0), &(&1 + 1))
       end)
 
-    phases = MapSet.put(run.phases, run.members[@me].pilot.runner.phase)
+    phases = MapSet.put(run.phases, Swarm.Member.runner(run.members[@me]).phase)
     %{run | looks: looks, compared: compared, phases: phases}
   end
 

@@ -34,7 +34,7 @@ defmodule Sim.TrialTest do
       {:ok, trial} = Trial.new(%{seed: seed, blobs: :direct})
       trial = until(trial, &(Sim.Trial.RunLog.leader(&1.run_log) != nil))
       leader = Sim.Trial.RunLog.leader(trial.run_log)
-      reports = trial.members[leader].pilot.runner.mission.round.reports
+      reports = Swarm.Member.runner(trial.members[leader]).mission.round.reports
       assert map_size(reports) == 6
       assert reports[leader].merit
 
@@ -104,7 +104,7 @@ defmodule Sim.TrialTest do
 
   test "a gap in the middle closes, without a new election", %{formed: trial} do
     leader = Sim.Trial.RunLog.leader(trial.run_log)
-    second = Enum.at(trial.members[leader].pilot.runner.mission.order, 1)
+    second = Enum.at(Swarm.Member.runner(trial.members[leader]).mission.order, 1)
     trial = trial |> Trial.kill(second) |> to_the_end() |> assert_formed()
     assert Trial.result(trial).leader_changes == 0
     assert Trial.result(trial).leader == leader

@@ -86,7 +86,7 @@ defmodule Sim.Corridor do
 
     ended =
       Enum.reduce(ids, ended, fn id, ended ->
-        case Trial.robot(trial, id).pilot.runner do
+        case Swarm.Member.runner(Trial.robot(trial, id)) do
           %{phase: :done} ->
             Map.put_new(ended, id, {:done, trial.at_ms / 1000})
 

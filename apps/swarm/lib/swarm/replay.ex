@@ -31,7 +31,7 @@ defmodule Swarm.Replay do
       {member, replayed} ->
         {member,
          %{
-           robot: member.config.id,
+           robot: Member.id(member),
            at_ms: at_ms(input),
            input: input,
            recorded: recorded,
@@ -70,12 +70,12 @@ defmodule Swarm.Replay do
       end)
 
     %{
-      percept: Controller.percept(member.executive.controller),
-      wishes: Controller.wishes(before.executive.controller, percept),
-      driving: with({driving, _at_ms} <- member.entries[:driving], do: driving),
-      stopped?: member.estop.stop.held != [],
-      before: Runner.explain(before.pilot.runner),
-      mission: Runner.explain(member.pilot.runner),
+      percept: Controller.percept(Member.role(member, :executive).controller),
+      wishes: Controller.wishes(Member.role(before, :executive).controller, percept),
+      driving: with({driving, _at_ms} <- member.lockstep.board[:driving], do: driving),
+      stopped?: Member.held(member) != nil,
+      before: Runner.explain(Member.runner(before)),
+      mission: Runner.explain(Member.runner(member)),
       effects: effects
     }
   end

@@ -52,8 +52,11 @@ defmodule Console.Page.About do
 
   @doc "The same of a robot in lockstep, by what it perceived last; it has no devices and no camera pictures to look at."
   @spec of_member(Member.t()) :: t() | nil
-  def of_member(%Member{executive: %{controller: controller}} = member) do
+  def of_member(%Member{} = member) do
+    controller = Member.role(member, :executive).controller
+
     with %Percept{} = percept <- Controller.percept(controller) do
+      {id, mission} = {Member.id(member), member.lockstep.config.mission}
       weights = Controller.weights(controller)
 
       %{
@@ -65,14 +68,14 @@ defmodule Console.Page.About do
         limits: Controller.limits(controller) ++ (percept.driving || %{limits: []}).limits,
         power: percept.power,
         offline: [],
-        estop: member.estop.stop.held != [],
-        sonar: sonar(member.config.id, percept.sonar),
+        estop: Member.held(member) != nil,
+        sonar: sonar(id, percept.sonar),
         seen: nil,
         camera: false,
         pictures: nil,
         notes: []
       }
-      |> Map.merge(sight(member.config.id, now(percept), member.config.mission))
+      |> Map.merge(sight(id, now(percept), mission))
       |> Map.merge(wheels(percept.odometry))
     end
   end

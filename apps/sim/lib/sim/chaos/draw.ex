@@ -44,14 +44,15 @@ defmodule Sim.Chaos.Draw do
     {:ok, plan} = open.(map, length(robots))
     {landmark, random} = landmark(landmark, random, plan, {robots, world})
     {events, random} = Events.draw(random, robots, duration_s, &place(&1, plan, plan.room))
-    {script, _random} = Faults.draw(random, robots, duration_s, radio[:loss])
+    {script, random} = Faults.draw(random, robots, duration_s, radio[:loss])
+    {casts, _random} = Random.weighted(random, sent: 1, drawn: 1)
 
     fixed ++
       [landmark: landmark] ++
       events ++
       [script: script] ++
       radio ++
-      [noise: noise, duration_s: duration_s, blobs: blobs] ++ mission
+      [noise: noise, duration_s: duration_s, blobs: blobs, casts: casts] ++ mission
   end
 
   defp robots(random) do

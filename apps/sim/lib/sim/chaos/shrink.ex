@@ -18,6 +18,7 @@ defmodule Sim.Chaos.Shrink do
     noise: :off,
     noise: :default,
     blobs: :direct,
+    casts: :sent,
     start: :spread,
     lost_link: nil,
     policy: :available,

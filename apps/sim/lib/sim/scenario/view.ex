@@ -5,6 +5,7 @@ defmodule Sim.Scenario.View do
   alias Robot.Mission.Runner
   alias Sim.{Radio, Scene, Trial, World}
   alias Sim.Trial.RunLog
+  alias Swarm.Member
 
   @doc "Simulated seconds since the start."
   @spec at_s(Trial.t()) :: float()
@@ -26,7 +27,7 @@ defmodule Sim.Scenario.View do
   def phase(trial, robot) do
     case trial.members do
       %{^robot => member} ->
-        with {_module, phase} <- Runner.state(member.pilot.runner), do: phase
+        with {_module, phase} <- Runner.state(Member.runner(member)), do: phase
 
       _dead ->
         :dead

@@ -9,6 +9,7 @@ defmodule Sim.Trial.Coverage do
   alias Robot.Mission.Runner
   alias Robot.Navigation.{Grid, MapFile, Reach, Survey}
   alias Sim.Trial
+  alias Swarm.Member
 
   @cell Survey.cell()
   @radius Hal.Profile.magellan().radius
@@ -85,7 +86,7 @@ defmodule Sim.Trial.Coverage do
   def fullest(trial) do
     maps =
       for id <- Trial.living(trial),
-          map = Runner.map(Trial.robot(trial, id).pilot.runner),
+          map = Runner.map(Member.runner(Trial.robot(trial, id))),
           do: map
 
     Enum.max_by(maps, &known(&1.cells), fn -> nil end)

@@ -32,6 +32,7 @@ defmodule Sim.Trial.Options do
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
     duration_s: [{:check, &__MODULE__.duration?/1, "seconds, 0 to 1000000,"}, default: 120],
     plan: [{:one_of, [:none, :known, :sonar]}, default: :none],
+    casts: [{:one_of, [:sent, :drawn]}, default: :sent],
     blobs: [{:one_of, [:painted, :direct]}, default: :painted],
     hardware: [
       {:check, &__MODULE__.ids?/1, "a list of robots of this run, [:mag1],"},

@@ -32,7 +32,7 @@ defmodule Sim.Trial.Setup do
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.Missions`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
-  lockstep also `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
+  lockstep also `casts` (`:sent` or `:drawn`: in which order the parts of a robot's program hear each other), `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
@@ -79,14 +79,15 @@ defmodule Sim.Trial.Setup do
 
   @doc "The options of `Swarm.Member.new/1`, one list a robot, in the order of the fleet."
   @spec members(t()) :: [keyword()]
-  def members(%__MODULE__{robots: robots, mission: mission, plan: plan}) do
-    for robot <- robots,
+  def members(%__MODULE__{options: options} = setup) do
+    for {robot, n} <- Enum.with_index(setup.robots, 1),
         do: [
           id: robot.id,
           profile: robot.profile,
           start: robot.start,
-          mission: mission,
-          plan: plan
+          mission: setup.mission,
+          plan: setup.plan,
+          order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
   end
 

@@ -1,7 +1,7 @@
 defmodule Sim.Hardware.RecordingTest do
   @moduledoc """
   Missions of robots of processes with the real drivers, on emulated devices, recorded and replayed:
-  every decision of gate, executive and pilot must be the same again.
+  every decision of their roles must be the same again.
   """
   use ExUnit.Case, async: false
   import Swarm.Case, only: [eventually: 1, order: 1]
@@ -12,7 +12,7 @@ defmodule Sim.Hardware.RecordingTest do
   @moduletag :tmp_dir
 
   # Runs a mission of two robots until so many ms, and returns what its replay has compared.
-  defp mission(path, seed, until_ms, deeds \\ []) do
+  defp mission(path, seed, until_ms, deeds) do
     robots = [:mag71, :min71]
     {:ok, _apps} = Application.ensure_all_started(:swarm)
     {:ok, recorder} = Recorder.start_link(robots: robots, file: [path: path])
@@ -42,10 +42,11 @@ defmodule Sim.Hardware.RecordingTest do
     {replay, differences} = Recording.File.replay(file)
     assert differences == []
     counts = Replay.counts(replay)
-    assert length(counts) == 6
+    assert length(counts) == 8
 
-    for {_role, count} <- counts do
-      assert count.decisions > 0 and count.inputs > 0
+    for {{_robot, role}, count} <- counts do
+      # One that is not called to stop has nothing to do.
+      assert role == :estop or (count.decisions > 0 and count.inputs > 0)
       assert %{lost: 0, skipped: 0} = count
     end
 
@@ -58,8 +59,10 @@ defmodule Sim.Hardware.RecordingTest do
     do: counts |> Enum.map(fn {_key, count} -> count[what] end) |> Enum.sum()
 
   test "a mission with real drivers replays with equal decisions", %{tmp_dir: folder} do
-    {file, counts} = mission(Path.join(folder, "run.mcap"), 1, 4_000)
+    stopped = [{3_500, fn _fleet -> Swarm.estop() end}]
+    {file, counts} = mission(Path.join(folder, "run.mcap"), 1, 4_000, stopped)
     assert sum(counts, :decisions) > 300
+    assert [_one, _other] = for({{_robot, :estop}, %{decisions: n}} <- counts, n > 0, do: n)
 
     # An effect that is changed by the least that a float can be is found.
     entries = Enum.to_list(Recording.File.entries(file))

@@ -126,7 +126,10 @@ defmodule Sim.Scenario.NeverTest do
   defp spoil(trial, :stop_lost), do: %{trial | radio: Sim.Radio.lose(trial.radio, 1.0)}
 
   defp spoil(trial, :stop_ignored),
-    do: put_in(trial.members[:mag1].estop.stop, %Swarm.EStop.State{held: [{:mag1, 0, 1}]})
+    do:
+      put_in(trial.members[:mag1].lockstep.roles.estop.stop, %Swarm.EStop.State{
+        held: [{:mag1, 0, 1}]
+      })
 
   defp spoil(trial, _by_its_options), do: trial
 
