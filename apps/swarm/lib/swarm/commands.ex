@@ -4,7 +4,7 @@ defmodule Swarm.Commands do
   alias Hal.Options
   alias Hal.Options.Suggest
   alias Swarm.{Formation, Missions}
-  alias Swarm.{Commands, Order, Transport}
+  alias Swarm.{Commands, Transport}
 
   @doc "The ids of the given robots if all exist; the error is one line."
   @spec robots(term()) :: {:ok, [atom(), ...]} | {:error, String.t()}
@@ -117,7 +117,7 @@ defmodule Swarm.Commands do
   def any(robots, request) do
     answers = Commands.Client.ask(robots, request)
     {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
-    others = Enum.reject(others, &(answers[&1] == Order.shapeless(&1)))
+    others = Enum.reject(others, &(answers[&1] == {:error, :no_formation}))
     lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()
 
     case {taken, lines} do
@@ -130,6 +130,10 @@ defmodule Swarm.Commands do
 
   defp refusal(id, nil), do: "#{id} does not answer"
   defp refusal(_id, {:error, line}) when is_binary(line), do: line
+
+  defp refusal(id, {:error, :no_formation}),
+    do: "#{id} is not on a mission that has a formation; start it first"
+
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
 
   # The number of robots matters only for a whole length or side.

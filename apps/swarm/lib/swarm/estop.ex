@@ -195,11 +195,11 @@ defmodule Swarm.EStop do
 
   defp whole({:command, request, ref}), do: whole({:command, request, ref, nil})
 
-  defp whole({:command, request, ref, order}) when is_reference(ref),
-    do: {:command, request, ref, Freshness.arrived(order, node(ref) == node())}
-
-  # In lockstep nobody waits for an answer.
-  defp whole({:command, request, nil, order}), do: {:command, request, nil, order}
+  # Without a reference nothing waits for an answer, as in lockstep, and it is not known from which node it comes.
+  defp whole({:command, request, ref, order}) when ref == nil or is_reference(ref) do
+    here? = ref != nil and node(ref) == node()
+    {:command, request, ref, Freshness.arrived(order, here?)}
+  end
 
   # From the robot's comms process, which has determined when it was given.
   defp whole({:in_time, request, ref, given_us}) when is_reference(ref) and is_integer(given_us),

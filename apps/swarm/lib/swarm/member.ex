@@ -130,8 +130,8 @@ defmodule Swarm.Member do
       input(member, :pilot, {:cast, {:deliver, delivery, event}}, at_ms)
     else
       true ->
-        request = {:command, command, nil, {:asked, 1_000 * at_ms}}
-        input(member, :estop, {:cast, request}, at_ms)
+        stamp = {member.lockstep.config.boot, 1_000 * at_ms}
+        input(member, :estop, {:cast, {:command, command, nil, stamp}}, at_ms)
 
       {:error, _line} ->
         {member, []}

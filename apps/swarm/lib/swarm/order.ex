@@ -148,9 +148,4 @@ defmodule Swarm.Order do
       next -> if next in seen, do: Enum.reverse(seen), else: chain([next | seen], leaders)
     end
   end
-
-  @doc "The answer of a robot to a formation if its mission has none."
-  @spec shapeless(atom()) :: {:error, line :: String.t()}
-  def shapeless(id),
-    do: {:error, "#{id} is not on a mission that has a formation; start it first"}
 end

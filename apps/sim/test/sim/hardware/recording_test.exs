@@ -59,7 +59,12 @@ defmodule Sim.Hardware.RecordingTest do
     do: counts |> Enum.map(fn {_key, count} -> count[what] end) |> Enum.sum()
 
   test "a mission with real drivers replays with equal decisions", %{tmp_dir: folder} do
-    stopped = [{3_500, fn _fleet -> Swarm.estop() end}]
+    # The reset ends the repeats of the call, which would stop robots of the next test.
+    stopped = [
+      {3_000, fn _fleet -> Swarm.estop() end},
+      {3_500, fn _fleet -> Swarm.reset() end}
+    ]
+
     {file, counts} = mission(Path.join(folder, "run.mcap"), 1, 4_000, stopped)
     assert sum(counts, :decisions) > 300
     assert [_one, _other] = for({{_robot, :estop}, %{decisions: n}} <- counts, n > 0, do: n)

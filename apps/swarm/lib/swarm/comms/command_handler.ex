@@ -129,7 +129,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp answer(:ok, _id, _command), do: :ok
   defp answer({:error, :held}, id, _command), do: held(id)
-  defp answer({:error, :idle}, id, _formation), do: Order.shapeless(id)
+  defp answer({:error, :idle}, _id, _formation), do: {:error, :no_formation}
   defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
 
   defp answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}

@@ -39,7 +39,7 @@ defmodule Swarm.EStop.Broadcaster do
     GenServer.cast(__MODULE__, {:repeat, call, @times - 1})
   end
 
-  @doc "Passes on a call that was heard; a call of this node is being repeated anyway."
+  @doc "Passes on a call that was heard, unless it comes from this node, where it is repeated anyway."
   @spec pass_on(Calls.call(), age_ms :: non_neg_integer()) :: :ok
   def pass_on({node, _boot, _counter}, _age_ms) when node == node(), do: :ok
   def pass_on(call, age_ms), do: GenServer.cast(__MODULE__, {:pass_on, call, age_ms})
@@ -56,8 +56,15 @@ defmodule Swarm.EStop.Broadcaster do
 
   # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
-  def handle_cast({:repeat, call, times}, s) when times in 1..@times,
-    do: {:noreply, if(Calls.call?(call), do: repeat(s, call, times, Hal.Clock.now_ms()), else: s)}
+  def handle_cast({:repeat, call, times}, s) when times in 1..@times do
+    if Calls.call?(call) do
+      # Robots of this node need not pass it on.
+      {_new?, heard} = Calls.hear(s.heard, call)
+      {:noreply, repeat(%{s | heard: heard}, call, times, Hal.Clock.now_ms())}
+    else
+      {:noreply, s}
+    end
+  end
 
   def handle_cast({:pass_on, call, age_ms}, s) do
     whole? = Calls.call?(call) and Calls.age?(age_ms)

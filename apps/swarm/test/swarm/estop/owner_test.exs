@@ -283,6 +283,16 @@ defmodule Swarm.EStop.OwnerTest do
     refute latched?(id)
   end
 
+  test "a reset that only says when it was given counts from this node alone" do
+    id = robot(:owner_said)
+    estop = Names.whereis(id, :estop)
+    assert Swarm.ask(id, :estop) == :ok
+    GenServer.cast(estop, {:command, :reset, nil, {:asked, System.monotonic_time(:microsecond)}})
+    settled(id, [:estop, :pilot, :executive, :gate, :estop, :gate, :estop])
+    assert latched?(id)
+    assert Swarm.ask(id, :reset) == :ok
+  end
+
   test "it keeps up with neighbours that report one stop after the other, and a reset holds" do
     id = robot(:owner_flooded)
     comms = Names.whereis(id, :comms)
