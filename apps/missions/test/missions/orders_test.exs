@@ -168,7 +168,7 @@ defmodule Swarm.OrdersTest do
     :ok = :sys.resume(pilot)
     assert Task.await(answer) == :ok
     assert {Missions.Landmark, _phase} = state(id)
-    %{state: %{runner: %{mission: mission}}} = :sys.get_state(pilot)
+    {_phase, %{state: %{runner: %{mission: mission}}}} = :sys.get_state(pilot)
     assert {:wedge, _spacing} = mission.formation
   end
 
@@ -310,7 +310,8 @@ defmodule Swarm.OrdersTest do
       assert order(fn -> Swarm.formation(:wedge, spacing: 1.2) end) == :ok
       assert order(fn -> Swarm.stop(id) end) == :ok
       assert order(fn -> Swarm.start(robots: [id]) end) == :ok
-      %{state: %{runner: %{mission: mission}}} = :sys.get_state(Names.whereis(id, :pilot))
+      {_phase, %{state: %{runner: %{mission: mission}}}} =
+        :sys.get_state(Names.whereis(id, :pilot))
       assert mission.formation == {:wedge, 1.2}
     end
   end

@@ -1,12 +1,13 @@
 defmodule Robot.Host do
   @moduledoc """
   Runs a role of a robot (`Robot.Role`) as a process: hands it what arrives, carries out its effects, and records both
-  (`Robot.Trace`).
+  (`Robot.Trace`). A role that has phases (`c:Robot.Role.phase/1`) is run by `Robot.Host.Phases`, the others by a `GenServer`.
   """
   use Hal.HardenedServer
   alias Hal.{Device, Event, HardenedServer, Ticker}
   alias Robot.{Board, Names, Role, Trace}
   alias Robot.Control.Crash
+  alias Robot.Host.Phases
 
   @slow_us 50_000
 
@@ -19,12 +20,19 @@ defmodule Robot.Host do
   @spec start_link({module(), Robot.Config.t()}) :: GenServer.on_start()
   def start_link({role, %Robot.Config{id: id}} = arg) do
     spawned = [priority: role.priority(), message_queue_data: :off_heap]
-    options = [name: Names.via(id, role.name()), spawn_opt: spawned]
-    HardenedServer.start_link(__MODULE__, arg, options)
+    name = Names.via(id, role.name())
+
+    if Code.ensure_loaded?(role) and function_exported?(role, :phase, 1),
+      do: :gen_statem.start_link(name, Phases, arg, spawn_opt: spawned),
+      else: HardenedServer.start_link(__MODULE__, arg, name: name, spawn_opt: spawned)
   end
 
   @impl GenServer
-  def init({role, config}) do
+  def init(arg), do: {:ok, begin(arg)}
+
+  @doc "The state of a process with which it begins, once its first effects are carried out."
+  @spec begin({module(), Robot.Config.t()}) :: map()
+  def begin({role, config}) do
     board = Board.find!(config.id)
     at_ms = Robot.Config.now(config)
     config = %{config | boot: config.boot || System.system_time(:nanosecond)}
@@ -45,17 +53,14 @@ defmodule Robot.Host do
 
     Trace.begin(config, role.name(), state, at_ms)
     # Not recorded: they follow from no input.
-    {:ok, Enum.reduce(effects, s, &carry_out_one(&1, &2, at_ms))}
+    Enum.reduce(effects, s, &carry_out_one(&1, &2, at_ms))
   end
 
   @impl GenServer
-  def handle_call(message, from, s), do: arrived({:ask, from, message}, s)
+  def handle_call(message, from, s), do: {:noreply, arrived({:ask, from, message}, s)}
 
   @impl GenServer
-  def handle_cast(message, s) do
-    if s.ticker == nil, do: checkpoint(s, Robot.Config.now(s.config))
-    arrived({:cast, message}, s)
-  end
+  def handle_cast(message, s), do: {:noreply, arrived({:cast, message}, s)}
 
   @impl GenServer
   def handle_info(:tick, s) do
@@ -83,12 +88,19 @@ defmodule Robot.Host do
   defp checkpoint(s, at_ms),
     do: Trace.checkpoint(s.config, s.role.name(), fn -> s.state end, at_ms)
 
-  defp arrived(input, s) do
+  @doc "Handles what has arrived for the role; what it does not know is counted, and changes nothing."
+  @spec arrived(Role.input(), map()) :: map()
+  def arrived(input, s) do
+    at_ms = Robot.Config.now(s.config)
+    if s.ticker == nil and match?({:cast, _message}, input), do: checkpoint(s, at_ms)
+
     with input when input != :unknown <- whole(input, s),
-         %{} = s <- hand(input, s, Robot.Config.now(s.config)) do
-      {:noreply, s}
+         %{} = s <- hand(input, s, at_ms) do
+      s
     else
-      :unknown -> HardenedServer.drop(s)
+      :unknown ->
+        HardenedServer.drop(s)
+        s
     end
   end
 

@@ -91,7 +91,9 @@ defmodule Robot.Role do
 
   @doc "The module of others whose code runs on this input, so that one that hangs is found and named."
   @callback foreign(input(), state()) :: module() | nil
-  @optional_callbacks perceive: 3, foreign: 2, arrive: 3
+  @doc "The phase that it is in, for a role that has phases: its process shows it (`Robot.Host.Phases`)."
+  @callback phase(state()) :: term()
+  @optional_callbacks perceive: 3, foreign: 2, arrive: 3, phase: 1
 
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::

@@ -162,6 +162,10 @@ defmodule Robot.Control.Pilot do
   defp plan(%{plan: %Grid{} = plan}), do: plan
   defp plan(_sonar_or_none), do: nil
 
+  @doc "The state of its mission."
+  @impl Role
+  def phase(s), do: Runner.state(s.runner)
+
   @doc "The mission whose code runs on this input."
   @impl Role
   def foreign({:ask, _from, {:start, module, _options}}, _s) when is_atom(module), do: module

@@ -35,7 +35,7 @@ defmodule Robot.Control.DeliveryTest do
     deliver(id, :resumed, :start, [:resume, start()])
     assert_receive {:mission, {:command, :start}}
     assert_receive {:resumed, :ok}
-    assert %{state: %{state: {Acts.Mission, :left}}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {{Acts.Mission, :left}, _data} = :sys.get_state(Names.whereis(id, :pilot))
   end
 
   test "`:ok` comes from the executive, which has the goal by then" do
@@ -44,7 +44,7 @@ defmodule Robot.Control.DeliveryTest do
     :ok = :sys.suspend(executive)
     goal = {:goal, :roll, {Acts.Roll, twist: Twist.new(0.1, 0.0)}}
     deliver(id, :rolls, {:do, :ready, [goal]}, [start()])
-    assert %{state: %{state: {Acts.Mission, :ready}}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {{Acts.Mission, :ready}, _data} = :sys.get_state(Names.whereis(id, :pilot))
     refute_received {:rolls, _outcome}
     :ok = :sys.resume(executive)
     assert_receive {:rolls, :ok}
@@ -61,7 +61,7 @@ defmodule Robot.Control.DeliveryTest do
     :ok = Gate.reset(id)
     deliver(id, :missing, :go, [{:start, No.Such.Mission, []}])
     assert_receive {:missing, {:error, :no_mission}}
-    assert %{state: %{state: :idle}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
     refute_received {:mission, _event}
   end
 end

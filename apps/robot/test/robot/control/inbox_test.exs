@@ -23,7 +23,7 @@ defmodule Robot.Control.InboxTest do
     end
 
     assert parts(id, @parts) == before
-    assert %{state: %{state: {Acts.Mission, :ready}}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {{Acts.Mission, :ready}, _data} = :sys.get_state(Names.whereis(id, :pilot))
   end
 
   test "a start with options that its mission does not take is refused" do

@@ -15,11 +15,11 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.command(id, :anything) == {:error, :idle}
     assert Pilot.start(id) == {:error, :no_mission}
     assert Pilot.start(id, No.Such.Mission, []) == {:error, :no_mission}
-    assert %{state: %{state: :idle}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
     assert Pilot.start(id, Acts.Mission, test: self()) == :ok
-    assert %{state: %{state: {Acts.Mission, :ready}}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {{Acts.Mission, :ready}, _data} = :sys.get_state(Names.whereis(id, :pilot))
     assert Pilot.stop(id) == :ok
-    assert %{state: %{state: :idle}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
   end
 
   test "hands ticks, outcomes, messages and commands to the mission" do
@@ -156,7 +156,7 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.command(id, :go) == {:error, :idle}
     assert Pilot.resume(id) == :ok
     assert_receive {:mission, {:command, :start}}
-    assert %{state: %{state: {Acts.Mission, :left}}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {{Acts.Mission, :left}, _data} = :sys.get_state(Names.whereis(id, :pilot))
     assert Pilot.resume(id) == {:error, :idle}
   end
 

@@ -98,7 +98,7 @@ defmodule Robot.Safety.ArmingTest do
 
   defp still(id) do
     stands(300)
-    assert %{state: %{state: :idle}} = :sys.get_state(Names.whereis(id, :pilot))
+    assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
     assert {:ok, nil, _at_ms} = Board.fetch(Board.find!(id), :goal, :infinity)
     # On a busy machine a wish of its executive may be late, which the gate limits, too.
     eventually(fn ->

@@ -59,7 +59,7 @@ defmodule Swarm.Comms.WaitingTest do
     assert line =~ "idle"
     assert [comms, pilot] == [Names.whereis(id, :comms), Names.whereis(id, :pilot)]
     :ok = :sys.resume(pilot)
-    assert %{state: %{state: :idle}} = :sys.get_state(pilot)
+    assert {:idle, _data} = :sys.get_state(pilot)
     assert Swarm.goto(id, {1, 1}) == :ok
     assert state(id) == {Robot.Mission.Manual, :goto}
   end
