@@ -37,6 +37,8 @@ defmodule Console.Cli.Format do
 
       iex> Console.Cli.Format.meaning(%{stage: :killed, at_s: 40, robot: :mag1})
       "mag1 is dead"
+      iex> Console.Cli.Format.meaning(%{stage: :disarmed, at_s: 40, robot: :mag1})
+      "mag1's wheels were disarmed (its line, or a person), and its mission has ended"
       iex> Console.Cli.Format.meaning(%{stage: :formed, at_s: 40, robot: :mag1, as: :turned, asked: "line 2.0"})
       "every robot says that it stands in its place, turned: no room for line 2.0"
       iex> Console.Cli.Format.meaning(%{stage: :cannot_form, at_s: 40, robot: :mag1, asked: "line 2.0", followers: 4})
@@ -46,6 +48,9 @@ defmodule Console.Cli.Format do
   # A mission's own words.
   def meaning(%{says: says, robot: robot}), do: "#{robot} #{says}"
   def meaning(%{stage: :crashed, robot: robot, crash: crash}), do: "#{robot}: #{crash}"
+
+  def meaning(%{stage: :disarmed, robot: robot}),
+    do: "#{robot}'s wheels were disarmed (its line, or a person), and its mission has ended"
 
   def meaning(%{stage: :hangs, robot: robot, role: role, for_s: for_s}),
     do: "#{robot}: its #{role}, for #{for_s} s"

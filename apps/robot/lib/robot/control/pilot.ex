@@ -14,7 +14,7 @@ defmodule Robot.Control.Pilot do
   so that `Robot.Safety.LivenessMonitor` detects one that does not return, and kills the pilot.
 
   Wheels that are disarmed end the mission, whoever disarms them and whoever arms them again
-  (`arm: :manual` or `:auto`), and while they may not turn none starts (`Robot.Safety.Readiness`).
+  (`arm: :manual` or `:auto`), which a stage `:disarmed` tells people, and while they may not turn none starts (`Robot.Safety.Readiness`).
   So arming starts no motion.
 
   A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
@@ -212,7 +212,13 @@ defmodule Robot.Control.Pilot do
     do: if(Role.then?(then), do: idle(s, then, at_ms), else: :unknown)
 
   def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
-  def handle({:cast, :disarmed}, at_ms, s, _board), do: idle(s, nil, at_ms)
+
+  def handle({:cast, :disarmed}, at_ms, s, _board) do
+    told = if s.runner.module, do: [{:stage, :disarmed, %{}}], else: []
+    {s, effects} = idle(s, nil, at_ms)
+    {s, told ++ effects}
+  end
+
 
   def handle({:cast, {:tick, %Percept{at_ms: then_ms}}} = input, at_ms, s, board)
       when is_integer(then_ms) do

@@ -15,7 +15,7 @@ defmodule Sim.Recording.Facts do
           do: " #{key} #{value}"
 
     level =
-      if stage in [:killed, :lost, :refused, :cannot_form, :given_up, :crashed],
+      if stage in [:killed, :lost, :refused, :cannot_form, :given_up, :crashed, :disarmed],
         do: :warning,
         else: :info
 
