@@ -101,13 +101,8 @@ defmodule Swarm.Member do
 
   @doc "Handles one input, and returns the effects."
   @spec step(t(), input()) :: {t(), [effect()]}
-  # Its comms comes last, and begins a new life.
-  def step(member, {:crash, role, at_ms}) when role in [:gate, :executive, :pilot, :estop] do
-    fresh = Receiver.new(id(member))
-
-    %{member | sequence: 0, beat_ms: nil, receiver: fresh}
-    |> by(Lockstep.crash(member.lockstep, role, at_ms))
-  end
+  def step(member, {:crash, role, at_ms}) when role in [:gate, :executive, :pilot, :estop],
+    do: by(member, Lockstep.crash(member.lockstep, role, at_ms))
 
   def step(member, {:hang, {role, until_ms}, at_ms}) when role in [:executive, :pilot],
     do: by(member, Lockstep.hang(member.lockstep, role, until_ms, at_ms))
@@ -225,7 +220,13 @@ defmodule Swarm.Member do
   defp woken(member, at_ms), do: by(member, Lockstep.wake(member.lockstep, at_ms))
 
   defp by(member, {lockstep, effects}) do
-    id = lockstep.config.id
+    %{id: id, boot: boot} = lockstep.config
+
+    # Its comms comes behind all that can crash, and begins a new life, too.
+    member =
+      if boot == member.lockstep.config.boot,
+        do: member,
+        else: %{member | sequence: 0, beat_ms: nil, receiver: Receiver.new(id)}
 
     {%{member | lockstep: lockstep},
      Enum.map(effects, fn
