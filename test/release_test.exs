@@ -144,9 +144,10 @@ defmodule System.ReleaseTest do
 
     # It moves only once a person has armed it.
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
-    assert {said, 0} = robot(["rpc", ~s|{Swarm.tell(:mag1, "armm"), #{move}}|], environment)
+    # On a busy machine the first takes so long that the second is late.
     refused = ~S|{:error, "mag1: its wheels are disarmed; arm it first"}|
-    assert said =~ ~r/^{{:error,\s+".*"},\s+#{Regex.escape(refused)}}$/m
+    both = ~r/^{{:error,\s+"expected one of .*"},\s+#{Regex.escape(refused)}}$/m
+    until(both, ask.(["rpc", ~s|{Swarm.tell(:mag1, "armm"), #{move}}|]))
     assert speed(server) == 0.0
     until(~r/^{:ok, :ok}$/m, ask.(["rpc", "{Swarm.arm(:mag1), #{move}}"]))
     wait(fn -> speed(server) > 0.1 end)
