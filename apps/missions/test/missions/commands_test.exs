@@ -35,8 +35,7 @@ defmodule Swarm.CommandsTest do
     do: Board.fetch(Board.find!(id), :mission, :infinity) |> elem(1) |> Map.fetch!(:state)
 
   defp mission(id) do
-    {_phase, %{state: %{runner: %{mission: mission}}}} =
-      :sys.get_state(Names.whereis(id, :pilot))
+    {_phase, %{state: %{runner: %{mission: mission}}}} = :sys.get_state(Names.whereis(id, :pilot))
     mission
   end
 

@@ -310,8 +310,10 @@ defmodule Swarm.OrdersTest do
       assert order(fn -> Swarm.formation(:wedge, spacing: 1.2) end) == :ok
       assert order(fn -> Swarm.stop(id) end) == :ok
       assert order(fn -> Swarm.start(robots: [id]) end) == :ok
+
       {_phase, %{state: %{runner: %{mission: mission}}}} =
         :sys.get_state(Names.whereis(id, :pilot))
+
       assert mission.formation == {:wedge, 1.2}
     end
   end

@@ -219,7 +219,6 @@ defmodule Robot.Control.Pilot do
     {s, told ++ effects}
   end
 
-
   def handle({:cast, {:tick, %Percept{at_ms: then_ms}}} = input, at_ms, s, board)
       when is_integer(then_ms) do
     if at_ms - then_ms > @old_ms or replaced?(then_ms, board),

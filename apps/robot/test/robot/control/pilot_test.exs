@@ -148,7 +148,7 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.start(id, Acts.Mission, test: self(), halted: :left) == :ok
     assert Pilot.stop(id) == :ok
 
-    assert %{state: %{state: :idle, runner: %{mission: nil}}} =
+    assert {:idle, %{state: %{runner: %{mission: nil}}}} =
              :sys.get_state(Names.whereis(id, :pilot))
 
     # A second stop takes nothing away.
