@@ -24,8 +24,8 @@ defmodule Agents.Responder do
   `:failure`, the event `[:swarm, :responder, :failure]` reports it, and the state is kept:
   otherwise four bad envelopes within five seconds would end the robot.
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Robot.Names
   alias Agents.{Conversation, Envelope, Inbox}
   alias Swarm.Directory
@@ -93,7 +93,7 @@ defmodule Agents.Responder do
         )
 
     via = Names.via(name, {:service, options[:service]})
-    HardenedServer.start_link(__MODULE__, {name, options}, name: via)
+    GenServer.start_link(__MODULE__, {name, options}, name: via)
   end
 
   # The exports of a module are known only once it is loaded.
@@ -126,6 +126,10 @@ defmodule Agents.Responder do
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Inbox.counts(s.inbox), s}
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info(message, s) do

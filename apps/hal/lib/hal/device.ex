@@ -69,7 +69,7 @@ defmodule Hal.Device do
   `acknowledge/1` is needed first. The reading `{:arming, %{state: state, why: line or nil}}`
   reports the state.
   """
-  alias Hal.{HardenedServer, Twist}
+  alias Hal.Twist
   alias Hal.Device.Arming
   alias Hal.Device.{Server, State}
 
@@ -85,7 +85,7 @@ defmodule Hal.Device do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
-    HardenedServer.start_link(Server, State.new!(options), name)
+    GenServer.start_link(Server, State.new!(options), name)
   end
 
   @doc "A child specification; a supervisor may have several devices if their names differ."

@@ -17,7 +17,6 @@ defmodule Hal.Event do
   | `[:hal, :device, :refused]` | `at_ms`, `refused` (how many so far) | `device`, `driver`: a speed came for wheels that are not armed |
   | `[:hal, :device, :refusal]` | `at_ms`, `count` (so far) | `device`, `driver`, `request`, `line`: the device itself refused what it was told, such as `:look`; the first in a row, and every 10 s (`Hal.Device.Obedience`) |
   | `[:hal, :device, :odd]` | `at_ms` | `device`, `driver`, `line`: something about the device is unusual, such as a camera that is taken for another model |
-  | `[:hal, :server, :dropped]` | `at_ms`, `count` (so far) | `server` (the module), `name` (of its process, or its pid): it dropped a message that it does not know; at most once a minute for each process (`Hal.HardenedServer`) |
   | `[:hal, :event, :failure]` | | `handler`, `event`, `kind`, `reason`: a handler failed and was detached |
   | `[:vision, :view, :failed]` | `at_ms` | `view`, `reason`, `line`: the encoder of the pictures failed, and is restarted |
   | `[:vision, :view, :healed]` | `at_ms` | `view`: the encoder makes pictures again |
@@ -42,6 +41,7 @@ defmodule Hal.Event do
   | `[:robot, :pilot, :silent]`, `[:robot, :pilot, :hung]`, `[:robot, :pilot, :again]` | `at_ms` | `robot`, `mission`, `line`: the same for a mission that does not return |
   | `[:robot, :gate, :silent]`, `[:robot, :gate, :hung]`, `[:robot, :gate, :again]` | `at_ms` | `robot`, `line`: the same for a gate that does not step |
   | `[:robot, :pilot, :phase]` | `at_ms` | `robot`, `state`: `:idle` or `{mission, phase}` |
+  | `[:robot, :role, :dropped]` | `at_ms`, `count` (so far) | `robot`, `role`: its process was sent what the role does not know; at most once a minute for each process |
   | `[:robot, :stage]` | `at_ms` | `robot`, `stage`, and fields that the mission adds; `:refused`: `from`, `epoch`, `allowed`: that robot claims an epoch that no fleet can have reached, and is left out; `:given_up`: `x`, `y`, `blocked_by`: the robot gives up its way to that place; `:crashed`: `crash`, what failed in its mission or in a behaviour, and where: the robot is idle; `:disarmed`: its wheels were disarmed, which has ended its mission; `:replacement`: `what` (`:changing`, `:replaced`, `:kept`, `:back`), `from` (the node that ordered it), `code` (its digest, or `nil`), `says`: another mission was put in the place of the robot's own (`Swarm.replace/2`) |
   | `[:mesh, :refused]` | `at_ms` | `refused` (`:them`, `:us`), `who`, `address`, `why` (text or `nil`): this node refused another one, or was refused by it |
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node crashed; it is restarted |

@@ -7,8 +7,7 @@ defmodule Mesh.CommandRelay do
   (`c:Mesh.Consumer.command/2`). The answer returns the same way. No process waits: a request that
   cannot be passed on is lost, and the caller gives up by itself.
   """
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Mesh.Nonblocking
   alias Mesh.Protocol.WireTerm
   alias Mesh.Distribution.Topology
@@ -20,7 +19,7 @@ defmodule Mesh.CommandRelay do
 
   @doc "Starts the relay of this node, with the module that takes commands (`Mesh.Consumer`)."
   @spec start_link(module()) :: GenServer.on_start()
-  def start_link(consumer), do: HardenedServer.start_link(__MODULE__, consumer, name: __MODULE__)
+  def start_link(consumer), do: GenServer.start_link(__MODULE__, consumer, name: __MODULE__)
 
   @doc """
   Sends a request to a robot on `node`. `ref` is the alias in it for the answer.
@@ -37,6 +36,10 @@ defmodule Mesh.CommandRelay do
 
   @impl GenServer
   def init(consumer), do: {:ok, %{consumer: consumer, asked: %{}}}
+
+  # It has a name that other nodes send to, so anything may arrive here.
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_cast({:there, [], [_ | _] = back, robot, request, ref}, s) when is_tuple(request) do
@@ -62,6 +65,8 @@ defmodule Mesh.CommandRelay do
     {:noreply, s}
   end
 
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_info({:forget, own}, s) when is_map_key(s.asked, own) do
     :erlang.unalias(own)
@@ -74,6 +79,8 @@ defmodule Mesh.CommandRelay do
     forward(next, {:back, rest, ref, answer})
     {:noreply, %{s | asked: asked}}
   end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   # The robot answers this process, which knows the way back.
   defp ask(s, robot, request, ref, back) do

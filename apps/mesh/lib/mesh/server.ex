@@ -7,9 +7,9 @@ defmodule Mesh.Server do
   It follows the cards and addresses of the machine, five times a second (`Mesh.Interface`). Sockets that cannot be
   opened are tried again with back-off; a robot without a network drives on, and says so (`Mesh.fault/0`).
   """
-  use Hal.HardenedServer
+  use GenServer
   alias Mesh.Distribution
-  alias Hal.{Event, HardenedServer}
+  alias Hal.Event
   alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Secret, Sockets, Table}
   alias Mesh.Protocol.{NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Distribution.{Dialer, Epmd}
@@ -20,7 +20,7 @@ defmodule Mesh.Server do
   @doc "Starts the server of this node, with the module that receives what it hears."
   @spec start_link({Options.t(), consumer :: module()}) :: GenServer.on_start()
   def start_link({%Options{}, _consumer} = start),
-    do: HardenedServer.start_link(__MODULE__, start, name: __MODULE__)
+    do: GenServer.start_link(__MODULE__, start, name: __MODULE__)
 
   @impl GenServer
   def init({%Options{} = options, consumer}) do
@@ -73,6 +73,7 @@ defmodule Mesh.Server do
   defp group(%{interface: {127, _, _, _}}), do: nil
   defp group(%{multicast: group}), do: group
 
+  # It has a name that other nodes send to, so anything may arrive here.
   @impl GenServer
   def handle_cast({:speak, to, message}, s) do
     if to == :all or WireTerm.names?(to),
@@ -98,6 +99,8 @@ defmodule Mesh.Server do
     end
   end
 
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_call(:counts, _from, s) do
     counts = %{sent: s.sent, heard: s.heard, rejected: s.protocol.rejected}
@@ -109,6 +112,8 @@ defmodule Mesh.Server do
     key = Secret.subkey(s.options.secret, label)
     {:reply, {:ok, :crypto.mac(:hmac, :sha256, key, bytes)}, s}
   end
+
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info({:udp, socket, ip, port, datagram}, %{sockets: %Sockets{} = sockets} = s)
@@ -130,8 +135,8 @@ defmodule Mesh.Server do
     {:noreply, s |> judge() |> publish() |> schedule()}
   end
 
-  # A reset of the network shows as an error on the socket.
-  def handle_info({:udp_error, _socket, _reason}, s), do: {:noreply, s}
+  # Also a reset of the network, which shows as an error on the socket.
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   # Cards and addresses come and go at any time. If the system does not tell, they are as before.
   defp machine(before) do

@@ -12,7 +12,6 @@ defmodule Mesh.Supervisor do
   moment.
   """
   use Supervisor
-  alias Hal.HardenedSupervisor
   alias Mesh.{CommandRelay, Options}
   alias Mesh.Distribution.{Dialer, Libcluster}
 
@@ -22,7 +21,7 @@ defmodule Mesh.Supervisor do
   """
   @spec start_link({Options.t(), consumer :: module()}) :: Supervisor.on_start()
   def start_link({%Options{}, _consumer} = start),
-    do: HardenedSupervisor.start_link(__MODULE__, start)
+    do: Supervisor.start_link(__MODULE__, start)
 
   @impl Supervisor
   def init({options, consumer} = start) do

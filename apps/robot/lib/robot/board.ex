@@ -59,8 +59,7 @@ defmodule Robot.Board do
   (real robots) it also survives a restart of the board and of the machine: the file exists while the latch is set. Who
   must know asks by `saved/2`. A write that failed is tried again; until then `unsaved/1` says why.
   """
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Robot.Board.{Files, Latch}
   alias Robot.{Departure, Names}
   alias Vision.Detections
@@ -133,7 +132,7 @@ defmodule Robot.Board do
 
   @doc "Starts the board of a robot."
   @spec start_link(Robot.Config.t()) :: GenServer.on_start()
-  def start_link(%Robot.Config{} = config), do: HardenedServer.start_link(__MODULE__, config)
+  def start_link(%Robot.Config{} = config), do: GenServer.start_link(__MODULE__, config)
 
   @doc "The board of a robot on this node."
   @spec find(robot :: atom()) :: {:ok, t()} | :error
@@ -317,15 +316,11 @@ defmodule Robot.Board do
   def handle_cast(:latch, s), do: {:noreply, save(s)}
 
   # The latch itself decides, not the order in which the messages of several processes arrive.
-  def handle_cast({:saved, {m, f, a} = then}, s) do
-    if HardenedServer.callable?(then, 1) do
-      s = if saved?(s.board), do: s, else: save(s)
-      fault = unsaved(s.board)
-      apply(m, f, a ++ [if(fault, do: {:error, fault}, else: :ok)])
-      {:noreply, s}
-    else
-      HardenedServer.drop(s)
-    end
+  def handle_cast({:saved, {m, f, a}}, s) do
+    s = if saved?(s.board), do: s, else: save(s)
+    fault = unsaved(s.board)
+    apply(m, f, a ++ [if(fault, do: {:error, fault}, else: :ok)])
+    {:noreply, s}
   end
 
   def handle_cast(:depart, s), do: {:noreply, noted(s)}

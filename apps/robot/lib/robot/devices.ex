@@ -21,7 +21,6 @@ defmodule Robot.Devices do
   cure, and the robot's supervisor handles the failure.
   """
   use Supervisor
-  alias Hal.HardenedSupervisor
   alias Robot.{Board, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.Gate
@@ -31,7 +30,7 @@ defmodule Robot.Devices do
 
   @doc "Starts the devices of a robot whose board is running."
   @spec start_link(Robot.Config.t()) :: Supervisor.on_start()
-  def start_link(%Robot.Config{} = config), do: HardenedSupervisor.start_link(__MODULE__, config)
+  def start_link(%Robot.Config{} = config), do: Supervisor.start_link(__MODULE__, config)
 
   @impl Supervisor
   def init(%Robot.Config{id: id} = config) do

@@ -8,13 +8,12 @@ defmodule Robot.Fleet do
   everything afresh.
   """
   use DynamicSupervisor
-  alias Hal.HardenedSupervisor
   alias Robot.Names
 
   @doc "Starts a fleet without robots. `:name` as in `GenServer`."
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options),
-    do: HardenedSupervisor.start_dynamic(__MODULE__, [], Keyword.take(options, [:name]))
+    do: DynamicSupervisor.start_link(__MODULE__, [], Keyword.take(options, [:name]))
 
   @doc "Starts a robot. `restart` determines whether its end also ends the fleet, see above."
   @spec start_robot(Supervisor.supervisor(), Robot.Config.t(), :temporary | :permanent) ::

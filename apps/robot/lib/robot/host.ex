@@ -3,13 +3,14 @@ defmodule Robot.Host do
   Runs a role of a robot (`Robot.Role`) as a process: hands it what arrives, carries out its effects, and records both
   (`Robot.Trace`). A role that has phases (`c:Robot.Role.phase/1`) is run by `Robot.Host.Phases`, the others by a `GenServer`.
   """
-  use Hal.HardenedServer
-  alias Hal.{Device, Event, HardenedServer, Ticker}
+  use GenServer
+  alias Hal.{Device, Event, Ticker}
   alias Robot.{Board, Names, Role, Trace}
   alias Robot.Control.Crash
   alias Robot.Host.Phases
 
   @slow_us 50_000
+  @dropped_every_ms 60_000
 
   @doc "The process of a role as a child of the robot's supervisor."
   @spec child_spec({module(), Robot.Config.t()}) :: Supervisor.child_spec()
@@ -24,7 +25,7 @@ defmodule Robot.Host do
 
     if Code.ensure_loaded?(role) and function_exported?(role, :phase, 1),
       do: :gen_statem.start_link(name, Phases, arg, spawn_opt: spawned),
-      else: HardenedServer.start_link(__MODULE__, arg, name: name, spawn_opt: spawned)
+      else: GenServer.start_link(__MODULE__, arg, name: name, spawn_opt: spawned)
   end
 
   @impl GenServer
@@ -48,7 +49,8 @@ defmodule Robot.Host do
       config: config,
       board: board,
       state: state,
-      ticker: ticker
+      ticker: ticker,
+      dropped: {0, at_ms}
     }
 
     Trace.begin(config, role.name(), state, at_ms)
@@ -70,13 +72,15 @@ defmodule Robot.Host do
 
     case tick(s, at_ms) do
       :unknown ->
-        HardenedServer.drop(s)
+        {:noreply, dropped(s)}
 
       s ->
         slow(s, System.monotonic_time(:microsecond) - begun_us)
         {:noreply, %{s | ticker: Ticker.next(s.ticker)}}
     end
   end
+
+  def handle_info(message, s), do: {:noreply, arrived({:info, message}, s)}
 
   defp slow(_s, took_us) when took_us <= @slow_us, do: :ok
 
@@ -98,9 +102,19 @@ defmodule Robot.Host do
          %{} = s <- hand(input, s, at_ms) do
       s
     else
-      :unknown ->
-        HardenedServer.drop(s)
-        s
+      :unknown -> dropped(s)
+    end
+  end
+
+  defp dropped(%{dropped: {count, due_ms}} = s) do
+    at_ms = Robot.Config.now(s.config)
+
+    if at_ms >= due_ms do
+      about = %{robot: s.config.id, role: s.role.name()}
+      Event.execute([:robot, :role, :dropped], %{at_ms: at_ms, count: count + 1}, about)
+      %{s | dropped: {count + 1, at_ms + @dropped_every_ms}}
+    else
+      %{s | dropped: {count + 1, due_ms}}
     end
   end
 

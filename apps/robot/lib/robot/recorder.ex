@@ -17,8 +17,8 @@ defmodule Robot.Recorder do
 
   Each file begins with a checkpoint of each role, and has one each minute.
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Robot.Names
   alias Robot.Recorder.{Options, Output, Pictures, Queue}
 
@@ -38,7 +38,7 @@ defmodule Robot.Recorder do
   the entries under way, and `again_ms`, until a folder is tried again. It starts even if the file cannot be made (`status/1`).
   """
   @spec start_link(keyword()) :: GenServer.on_start()
-  def start_link(options), do: HardenedServer.start_link(__MODULE__, Map.new(options))
+  def start_link(options), do: GenServer.start_link(__MODULE__, Map.new(options))
 
   @doc "The child spec of the recorder of one robot, from its id and its file's `record:`."
   @spec child_spec({robot :: atom(), keyword()} | keyword()) :: Supervisor.child_spec()

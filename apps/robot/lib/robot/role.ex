@@ -32,7 +32,7 @@ defmodule Robot.Role do
 
   Effects are carried out in the order of the list. `Robot.Trace` records those that others notice (`recorded?/1`).
   """
-  alias Hal.{HardenedServer, Twist}
+  alias Hal.Twist
   alias Robot.Board
 
   @type input ::
@@ -98,14 +98,6 @@ defmodule Robot.Role do
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::
               {state(), [effect()]} | :unknown
-
-  @doc "Whether a term is `t:then/0`, which can be applied with so many more arguments."
-  @spec then?(term(), more :: non_neg_integer()) :: boolean()
-  def then?(then, more \\ 0)
-  def then?({:cast, role, _message}, 0) when is_atom(role), do: true
-
-  def then?(then, more),
-    do: then in [nil, :recorded] or HardenedServer.callable?(then, more)
 
   @doc "Whether an effect is recorded: what other roles, robots, devices and people notice."
   @spec recorded?(effect()) :: boolean()

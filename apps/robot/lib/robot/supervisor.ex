@@ -19,7 +19,6 @@ defmodule Robot.Supervisor do
   `Robot.Fleet` determines what happens then.
   """
   use Supervisor
-  alias Hal.HardenedSupervisor
   alias Robot.{Board, Devices, Host, Names}
   alias Robot.Control.{Executive, Pilot}
   alias Robot.Safety.{Gate, LivenessMonitor}
@@ -27,7 +26,7 @@ defmodule Robot.Supervisor do
   @doc "Starts a robot. `Robot.Names` must be running."
   @spec start_link(Robot.Config.t()) :: Supervisor.on_start()
   def start_link(%Robot.Config{} = config),
-    do: HardenedSupervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
+    do: Supervisor.start_link(__MODULE__, config, name: Names.via(config.id, :robot))
 
   @doc "The child specification of a robot, with the robot's id as part of the child's id."
   @spec child_spec(Robot.Config.t()) :: Supervisor.child_spec()

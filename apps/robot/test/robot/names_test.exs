@@ -1,6 +1,5 @@
 defmodule Robot.NamesTest do
   use Robot.Case, async: false
-  doctest Names
 
   # A process that has this role until it is killed.
   defp holder(robot, role, value \\ nil) do

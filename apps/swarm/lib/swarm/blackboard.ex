@@ -26,7 +26,6 @@ defmodule Swarm.Blackboard do
     * `:limits` - as in `Swarm.Blackboard.State.new/1`
     * `:seed` - of the random choice of nodes (by default a new one each time)
   """
-  alias Hal.HardenedServer
   alias Swarm.Blackboard
   alias Mesh.{Nonblocking, SafeTable}
 
@@ -49,7 +48,7 @@ defmodule Swarm.Blackboard do
         limits: []
       ])
 
-    HardenedServer.start_link(Blackboard.Server, options, name: options[:name])
+    GenServer.start_link(Blackboard.Server, options, name: options[:name])
   end
 
   @doc """

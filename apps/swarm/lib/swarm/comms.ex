@@ -27,7 +27,7 @@ defmodule Swarm.Comms do
     * `:boot` - a number that grows with every start; by default the time of day
   """
   use GenServer
-  alias Hal.{Event, HardenedServer, Ticker}
+  alias Hal.{Event, Ticker}
   alias Robot.Mission.{Claim, Letter}
   alias Robot.{Board, Names}
   alias Robot.Control.Pilot
@@ -72,7 +72,7 @@ defmodule Swarm.Comms do
   @doc "Starts the comms process of a robot, as its supervisor does."
   @spec start_link(Robot.Config.t(), keyword()) :: GenServer.on_start()
   def start_link(%Robot.Config{} = config, options) do
-    HardenedServer.start_link(__MODULE__, {config, options},
+    GenServer.start_link(__MODULE__, {config, options},
       name: Names.via(config.id, :comms),
       spawn_opt: [message_queue_data: :off_heap]
     )

@@ -16,8 +16,6 @@ defmodule Swarm.Directory do
   A directory that restarts is empty, and one that is down cannot be entered: a process that
   entered monitors it (`monitor/0`), and enters again.
   """
-  alias Swarm.Directory
-
   @type group ::
           :robots
           | :estops
@@ -31,7 +29,7 @@ defmodule Swarm.Directory do
   @doc "The scope as a child."
   @spec child_spec(term()) :: Supervisor.child_spec()
   def child_spec(_options),
-    do: %{id: __MODULE__, start: {Directory.Scope, :start_link, [__MODULE__]}}
+    do: %{id: __MODULE__, start: {:pg, :start_link, [__MODULE__]}}
 
   @doc "Adds a local process to groups."
   @spec enter(pid(), [group()]) :: :ok | {:error, :down}

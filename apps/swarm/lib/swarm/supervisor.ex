@@ -21,7 +21,6 @@ defmodule Swarm.Supervisor do
   without its robots: then the application ends, and the machine's supervisor starts it again.
   """
   use Supervisor
-  alias Hal.HardenedSupervisor
 
   defmodule Parts do
     @moduledoc false
@@ -30,7 +29,7 @@ defmodule Swarm.Supervisor do
     alias Swarm.Supervisor.BackoffSupervisor
 
     @doc false
-    def start_link(options), do: HardenedSupervisor.start_link(__MODULE__, options)
+    def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 
     @impl Supervisor
     def init(options) do
@@ -57,7 +56,7 @@ defmodule Swarm.Supervisor do
   `machine` are the options of `Swarm.Host.Systemd`, `recorder` a robot with those of its recorder.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()
-  def start_link(options), do: HardenedSupervisor.start_link(__MODULE__, options)
+  def start_link(options), do: Supervisor.start_link(__MODULE__, options)
 
   @impl Supervisor
   def init(options) do

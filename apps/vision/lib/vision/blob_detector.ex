@@ -25,8 +25,8 @@ defmodule Vision.BlobDetector do
   A camera's device passes its frames on by the sink `{Vision.BlobDetector, :frame, [detector]}`,
   a pan-tilt unit's device its readings by `{Vision.BlobDetector, :aim, [detector]}`.
   """
-  use Hal.HardenedServer
-  alias Hal.{Frame, HardenedServer, Ptz}
+  use GenServer
+  alias Hal.{Frame, Ptz}
   alias Vision.{Colours, Detections, Filter}
 
   defguardp is_aim(reading)
@@ -44,7 +44,7 @@ defmodule Vision.BlobDetector do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
-    HardenedServer.start_link(__MODULE__, check!(options), name)
+    GenServer.start_link(__MODULE__, check!(options), name)
   end
 
   @doc """
@@ -56,9 +56,11 @@ defmodule Vision.BlobDetector do
   def frame(detector, {:frame, frame}), do: GenServer.cast(detector, {:frame, frame})
   def frame(_eye, _other_reading), do: :ok
 
-  @doc "Passes a pan-tilt unit's reading to the blob detector. Its health is ignored."
+  @doc "Passes a pan-tilt unit's reading to the blob detector. Its health, and a reading without numbers, are ignored."
   @spec aim(GenServer.server(), Hal.Ptz.reading() | tuple()) :: :ok
-  def aim(detector, {:ptz, reading}), do: GenServer.cast(detector, {:aim, reading})
+  def aim(detector, {:ptz, reading}) when is_aim(reading),
+    do: GenServer.cast(detector, {:aim, reading})
+
   def aim(_eye, _other_reading), do: :ok
 
   @doc """
@@ -78,8 +80,7 @@ defmodule Vision.BlobDetector do
   end
 
   @impl GenServer
-  def handle_cast({:aim, reading}, state) when is_aim(reading),
-    do: {:noreply, note(reading, state)}
+  def handle_cast({:aim, reading}, state), do: {:noreply, note(reading, state)}
 
   def handle_cast({:frame, frame}, state) do
     {frame, dropped} = newest(frame, 0)
@@ -113,7 +114,7 @@ defmodule Vision.BlobDetector do
   # taken.
   defp newest_aim(state) do
     receive do
-      {:"$gen_cast", {:aim, reading}} when is_aim(reading) -> newest_aim(note(reading, state))
+      {:"$gen_cast", {:aim, reading}} -> newest_aim(note(reading, state))
     after
       0 -> state
     end

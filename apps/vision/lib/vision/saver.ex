@@ -22,8 +22,8 @@ defmodule Vision.Saver do
   picture when the last one is written. A full disk does not make it delete more than its limits
   require.
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Vision.Saver.{Options, Retention}
   alias Vision.View
 
@@ -50,7 +50,7 @@ defmodule Vision.Saver do
 
     case options(given) do
       {:ok, given} ->
-        HardenedServer.start_link(__MODULE__, given ++ ours, Keyword.take(ours, [:name]))
+        GenServer.start_link(__MODULE__, given ++ ours, Keyword.take(ours, [:name]))
 
       {:error, line} ->
         raise ArgumentError, line

@@ -25,7 +25,7 @@ defmodule Vision.View do
 
   Pictures do not leave their node: a viewer on another one is refused.
   """
-  alias Hal.{Frame, HardenedServer}
+  alias Hal.Frame
   alias Vision.View.{Picture, Server}
 
   @rates {0.001, 30}
@@ -54,7 +54,7 @@ defmodule Vision.View do
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
     options = Keyword.validate!(options, [:demand, viewers: 16, ffmpeg: nil, snapshot_ms: 5_000])
-    HardenedServer.start_link(Server, Map.new(options), name)
+    GenServer.start_link(Server, Map.new(options), name)
   end
 
   @doc """

@@ -1,14 +1,13 @@
 defmodule Agents.Topic.Subscription do
   @moduledoc false
   # Joins the topic's group for its owner, who gets one envelope for each that it asks for.
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Agents.{Envelope, Mailbox, Template}
   alias Swarm.Directory
 
   @spec start_link(pid(), Envelope.topic(), pos_integer(), Template.t()) :: GenServer.on_start()
   def start_link(owner, topic, limit, template),
-    do: HardenedServer.start_link(__MODULE__, {owner, topic, limit, template})
+    do: GenServer.start_link(__MODULE__, {owner, topic, limit, template})
 
   @impl GenServer
   def init({owner, topic, limit, template}) do
@@ -36,11 +35,14 @@ defmodule Agents.Topic.Subscription do
     {:reply, Map.put(counts, :waiting, Mailbox.size(s.mailbox)), s}
   end
 
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_cast({:more, owner}, %{owner: owner} = s),
     do: {:noreply, hand_over(%{s | asked: s.asked + 1})}
 
   def handle_cast({:unsubscribe, owner}, %{owner: owner} = s), do: {:stop, :normal, s}
+  def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info({:DOWN, _monitor, :process, owner, _reason}, %{owner: owner} = s),

@@ -2,14 +2,12 @@ defmodule Hal.Device.Server do
   @moduledoc false
   # Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
   # which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
-  use Hal.HardenedServer
+  use GenServer
   alias Hal.Device.Arming
   alias Hal.Device.{Confirmation, Lifecycle, Publisher, Requests, State}
-  alias Hal.{HardenedServer, Twist}
+  alias Hal.Twist
 
   @rest_ms 500
-  # Nothing drives so fast (m/s, rad/s): drivers may calculate with what is below.
-  @senseless 1.0e6
 
   @impl GenServer
   def init(%State{} = s) do
@@ -46,7 +44,7 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
 
-  def handle_call({:arm, until_ms}, _from, s) when is_integer(until_ms) do
+  def handle_call({:arm, until_ms}, _from, s) do
     {answer, s} = order(s, :arm, until_ms)
     {:reply, answer, s}
   end
@@ -57,45 +55,30 @@ defmodule Hal.Device.Server do
   end
 
   @impl GenServer
-  def handle_cast({:drive, %Twist{linear: linear, turn: turn} = twist}, %{kind: :drive} = s)
-      when is_number(linear) and is_number(turn) and abs(linear) < @senseless and
-             abs(turn) < @senseless do
+  def handle_cast({:drive, %Twist{} = twist}, %{kind: :drive} = s) do
     # A speed is valid only now.
     if s.inner == :closed, do: {:noreply, s}, else: {:noreply, Lifecycle.drive(s, twist)}
   end
 
   def handle_cast({:disarm, then}, %{kind: :drive} = s) do
-    if HardenedServer.then?(then) do
-      {_answer, s} = Lifecycle.order(s, :disarm)
-      with {m, f, a} <- then, do: apply(m, f, a)
-      {:noreply, s}
-    else
-      HardenedServer.drop(s)
-    end
+    {_answer, s} = Lifecycle.order(s, :disarm)
+    with {m, f, a} <- then, do: apply(m, f, a)
+    {:noreply, s}
   end
 
-  def handle_cast({:order, order, until_ms, {m, f, a} = reply}, s)
-      when order in [:arm, :disarm, :acknowledge] and is_integer(until_ms) do
-    if HardenedServer.callable?(reply, 1) do
-      {answer, s} = order(s, order, until_ms)
-      apply(m, f, a ++ [answer])
-      {:noreply, s}
-    else
-      HardenedServer.drop(s)
-    end
+  def handle_cast({:order, order, until_ms, {m, f, a}}, s) do
+    {answer, s} = order(s, order, until_ms)
+    apply(m, f, a ++ [answer])
+    {:noreply, s}
   end
 
-  def handle_cast({:confirm, within_ms, reply}, %{kind: :drive} = s)
-      when is_integer(within_ms) and within_ms in 1..5_000 do
-    if HardenedServer.callable?(reply, 1),
-      do: {:noreply, Confirmation.ask(s, within_ms, reply)},
-      else: HardenedServer.drop(s)
-  end
+  def handle_cast({:confirm, within_ms, reply}, %{kind: :drive} = s),
+    do: {:noreply, Confirmation.ask(s, within_ms, reply)}
 
-  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s) when is_float(pan) and is_float(tilt),
+  def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
     do: {:noreply, Requests.keep(s, :look, [pan, tilt])}
 
-  def handle_cast({:zoom, angle}, %{kind: :ptz} = s) when is_float(angle),
+  def handle_cast({:zoom, angle}, %{kind: :ptz} = s),
     do: {:noreply, Requests.keep(s, :zoom, [angle])}
 
   @impl GenServer

@@ -6,8 +6,8 @@ defmodule Mesh.Distribution.Dialer do
 
   This does not decide whether a node is alive: datagrams do (`Mesh.Protocol.NodeTable`).
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer, Ticker}
+  use GenServer
+  alias Hal.{Event, Ticker}
   alias Mesh.{Backoff, Options}
   alias Mesh.Protocol.Roster
   alias Mesh.Distribution.Topology
@@ -22,7 +22,7 @@ defmodule Mesh.Distribution.Dialer do
   @doc "Starts the dialer of this node."
   @spec start_link(Options.t()) :: GenServer.on_start()
   def start_link(%Options{} = options),
-    do: HardenedServer.start_link(__MODULE__, options, name: __MODULE__)
+    do: GenServer.start_link(__MODULE__, options, name: __MODULE__)
 
   @doc "Tells the dialer about a node."
   @spec note(:up | :suspect | :gone, node()) :: :ok
@@ -53,6 +53,9 @@ defmodule Mesh.Distribution.Dialer do
        ticker: Ticker.start(:tick, @tick_ms, @tick_ms)
      }}
   end
+
+  @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_cast({:note, :up, node}, s) do
@@ -96,6 +99,8 @@ defmodule Mesh.Distribution.Dialer do
 
   def handle_info({:DOWN, monitor, :process, _pid, _reason}, s),
     do: {:noreply, %{s | dialling: Map.delete(s.dialling, monitor)}}
+
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   defp row(now), do: %{since_ms: now, backoff: Backoff.new(now)}
 

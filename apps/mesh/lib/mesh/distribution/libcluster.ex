@@ -3,13 +3,13 @@ defmodule Mesh.Distribution.Libcluster do
   # Runs libcluster's topologies if libcluster is installed: any of its strategies then connects
   # nodes, and connected nodes introduce themselves to each other's mesh. If it crashes, the mesh
   # goes on, and it is started again with back-off.
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Mesh.Backoff
 
   @doc "Starts libcluster; `topologies` are in its format."
   @spec start_link(keyword()) :: GenServer.on_start()
-  def start_link(topologies), do: HardenedServer.start_link(__MODULE__, topologies)
+  def start_link(topologies), do: GenServer.start_link(__MODULE__, topologies)
 
   @impl GenServer
   def init(topologies) do

@@ -20,7 +20,7 @@ defmodule Robot.Control.Executive do
   @behaviour Robot.Role
   alias Hal.Odometry
   alias Robot.{Board, Departure, Mission, Names, Percept, Role}
-  alias Robot.Control.{Controller, Inbox}
+  alias Robot.Control.Controller
   alias Robot.Safety.{DryRun, Readiness}
 
   @call_ms 400
@@ -133,15 +133,6 @@ defmodule Robot.Control.Executive do
   def perceive(at_ms, s, board), do: {:tick, Percept.Snapshot.take(board, s.profile, at_ms)}
 
   @impl Role
-  def arrive({:ask, _from, {:goal, _tag, _goal} = order} = input, _now_us, _board),
-    do: if(Inbox.order?(order), do: input, else: :unknown)
-
-  def arrive({:cast, {:obey, order}} = input, _now_us, _board),
-    do: if(Inbox.order?(order), do: input, else: :unknown)
-
-  def arrive(input, _now_us, _board), do: input
-
-  @impl Role
   def handle({:tick, %Percept{} = raw}, _at_ms, s, _board), do: tick(s, raw)
 
   def handle({:ask, from, {:goal, _tag, _goal} = order}, _at_ms, s, board) do
@@ -153,22 +144,17 @@ defmodule Robot.Control.Executive do
   def handle({:cast, {:obey, order}}, _at_ms, s, board),
     do: if(refusal(order, s, board), do: {s, []}, else: obeyed(s, order))
 
-  def handle({:cast, {:confirm, then, result}}, _at_ms, s, _board) do
-    cond do
-      s.held? -> {s, []}
-      Role.then?(then, 1) -> {s, [{:apply, then, [result]}]}
-      true -> :unknown
-    end
-  end
+  def handle({:cast, {:confirm, _then, _result}}, _at_ms, %{held?: true} = s, _board), do: {s, []}
+
+  def handle({:cast, {:confirm, then, result}}, _at_ms, s, _board),
+    do: {s, [{:apply, then, [result]}]}
 
   def handle({:cast, :hold}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
   def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
   # The pilot, which is told too, ends the mission; one that hangs may still set a goal meanwhile.
   def handle({:cast, :disarmed}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
 
-  def handle({:cast, {:stand, then}}, _at_ms, s, _board) do
-    if Role.then?(then), do: drop(%{s | held?: false}, then), else: :unknown
-  end
+  def handle({:cast, {:stand, then}}, _at_ms, s, _board), do: drop(%{s | held?: false}, then)
 
   def handle(_unknown, _at_ms, _s, _board), do: :unknown
 

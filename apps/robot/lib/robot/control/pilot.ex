@@ -20,9 +20,8 @@ defmodule Robot.Control.Pilot do
   A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """
   @behaviour Robot.Role
-  alias Hal.HardenedServer
   alias Robot.{Board, Mission, Names, Percept, Role}
-  alias Robot.Control.{Delivery, Executive, Inbox}
+  alias Robot.Control.{Delivery, Executive}
   alias Robot.Localiser.Anchors
   alias Robot.Mission.Runner
   alias Robot.Safety.{Gate, Readiness}
@@ -177,12 +176,6 @@ defmodule Robot.Control.Pilot do
   def foreign(_input, %{runner: %{module: module}}), do: module
 
   @impl Role
-  def arrive({:cast, {:deliver, delivery, _event}} = input, _now_us, _board),
-    do: if(Inbox.delivery?(delivery), do: input, else: :unknown)
-
-  def arrive(input, _now_us, _board), do: input
-
-  @impl Role
   def handle({:ask, from, :start}, _at_ms, %{mission: nil} = s, _board),
     do: {s, [{:answer, from, {:error, :no_mission}}]}
 
@@ -208,8 +201,7 @@ defmodule Robot.Control.Pilot do
   def handle({:ask, from, {:command, _command} = event}, at_ms, s, board),
     do: answered(go({:hand, s.runner.module}, event, at_ms, s, board), from, s)
 
-  def handle({:cast, {:halt, then}}, at_ms, s, _board),
-    do: if(Role.then?(then), do: idle(s, then, at_ms), else: :unknown)
+  def handle({:cast, {:halt, then}}, at_ms, s, _board), do: idle(s, then, at_ms)
 
   def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
 
@@ -330,7 +322,7 @@ defmodule Robot.Control.Pilot do
 
   defp mission(module, options) do
     cond do
-      not (HardenedServer.callable?({module, :init, []}, 2) and
+      not (Code.ensure_loaded?(module) and function_exported?(module, :init, 2) and
                function_exported?(module, :handle, 2)) ->
         {:error, :no_mission}
 

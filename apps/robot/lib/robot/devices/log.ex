@@ -16,9 +16,9 @@ defmodule Robot.Devices.Log do
     [:hal, :device, :arming],
     [:hal, :device, :refusal],
     [:hal, :device, :odd],
-    [:hal, :server, :dropped],
     [:robot, :fault],
     [:robot, :stage],
+    [:robot, :role, :dropped],
     [:robot, :estop_file, :error],
     [:robot, :estop_file, :healed],
     [:robot, :departure_file, :failed],
@@ -109,9 +109,9 @@ defmodule Robot.Devices.Log do
        "it was told, but would not outlive a restart of the machine so; the file is tried again"}
   end
 
-  def line(:dropped, %{name: name, count: count}) do
+  def line(:dropped, %{robot: robot, role: role, count: count}) do
     {:warning,
-     "#{process(name)} was sent what it does not know; so far it has dropped #{count} messages"}
+     "#{robot}: its #{role} was sent what it does not know; so far it has dropped #{count} messages"}
   end
 
   def line(:failed, %{robots: [robot | _], line: line}),
@@ -165,9 +165,6 @@ defmodule Robot.Devices.Log do
     do: {:error, "#{robot} crashed, and is idle: #{crash}"}
 
   def line(:stage, _told_by_others), do: nil
-
-  defp process({robot, role}), do: "#{robot}: #{role}"
-  defp process(name), do: inspect(name)
 
   defp name(%{robot: robot, device: device}), do: "#{robot}: #{device}"
   defp name(%{device: device}), do: "#{device}"

@@ -7,9 +7,13 @@ defmodule Robot.Mission.Runner do
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.
   """
   alias Robot.{Mission, Percept}
+  alias Robot.Localiser.Anchors
   alias Robot.Mission.{Claim, Letter}
   alias Robot.Navigation.Grid
   import Robot.Mission, only: [is_order: 1]
+
+  # Radians: one that is far beyond any head.
+  @most_pan 1.0e6
 
   @enforce_keys [:robot]
   defstruct @enforce_keys ++
@@ -71,7 +75,7 @@ defmodule Robot.Mission.Runner do
   def resume(%__MODULE__{}), do: {:error, :idle}
 
   @doc """
-  Hands an event to the mission; an idle robot drops it. An invalid goal among the effects raises
+  Hands an event to the mission; an idle robot drops it. An invalid order among the effects raises
   `ArgumentError`.
   """
   @spec handle(t(), Mission.event()) :: {t(), [Mission.effect()]}
@@ -163,11 +167,19 @@ defmodule Robot.Mission.Runner do
 
   defp note({:claim, claim}, runner) when is_map(claim), do: %{runner | claim: claim}
 
-  # An invalid goal is an error of the mission, so the mission crashes, not the controller.
-  defp note({:goal, _tag, goal}, runner) do
-    with {:error, line} <- Robot.Behaviour.check(goal), do: raise(ArgumentError, line)
+  # An invalid order is an error of the mission, so the mission crashes, not the controller.
+  defp note(order, runner) when is_order(order) do
+    with {:error, line} <- check(order), do: raise(ArgumentError, line)
     runner
   end
 
   defp note(_effect, runner), do: runner
+
+  defp check({:goal, _tag, goal}), do: Robot.Behaviour.check(goal)
+  defp check({:anchors, %Anchors{}}), do: :ok
+  defp check({:look, nil}), do: :ok
+  defp check({:look, pan}) when is_number(pan) and abs(pan) < @most_pan, do: :ok
+
+  defp check(other),
+    do: {:error, "expected an order of a mission, got #{inspect(other, limit: 5)}"}
 end

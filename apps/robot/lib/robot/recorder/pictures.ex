@@ -6,8 +6,7 @@ defmodule Robot.Recorder.Pictures do
   #
   # A robot that has no camera, or none yet, is asked again after a second. It belongs to the recorder,
   # which starts it and to which it sends `{:picture, robot, %Vision.View.Picture{}}`.
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Robot.Names
   alias Vision.View
 
@@ -16,7 +15,7 @@ defmodule Robot.Recorder.Pictures do
   @doc "Starts it for the calling recorder: the robots, and the pictures a second of each."
   @spec start_link([atom()], rate :: number()) :: GenServer.on_start()
   def start_link(robots, rate),
-    do: HardenedServer.start_link(__MODULE__, {self(), robots, rate})
+    do: GenServer.start_link(__MODULE__, {self(), robots, rate})
 
   @doc "The recorder has taken a robot's picture."
   @spec taken(pid(), atom()) :: :ok

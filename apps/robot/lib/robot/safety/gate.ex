@@ -130,13 +130,9 @@ defmodule Robot.Safety.Gate do
     do: {%{s | reflex: Reflex.wish(s.reflex, twist, at_ms)}, []}
 
   def handle({:cast, {:forget, then}}, at_ms, s, _board) do
-    if Role.then?(then) do
-      {reflex, urgency} = Reflex.forget(s.reflex)
-      {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
-      {s, effects ++ applied(then)}
-    else
-      :unknown
-    end
+    {reflex, urgency} = Reflex.forget(s.reflex)
+    {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
+    {s, effects ++ applied(then)}
   end
 
   def handle({:cast, {:sense, {:arming, _state}}}, _at_ms, %{dry_run: true} = s, _board),
@@ -150,15 +146,11 @@ defmodule Robot.Safety.Gate do
   end
 
   def handle({:cast, {:latch, then}}, at_ms, s, _board) do
-    if Role.then?(then) do
-      {s, effects} = if Reflex.latched?(s.reflex), do: {s, []}, else: latched(s, at_ms)
-      {s, effects ++ applied(then)}
-    else
-      :unknown
-    end
+    {s, effects} = if Reflex.latched?(s.reflex), do: {s, []}, else: latched(s, at_ms)
+    {s, effects ++ applied(then)}
   end
 
-  def handle({:cast, {:unlatch, presses, about}}, _at_ms, s, _board) when is_integer(presses) do
+  def handle({:cast, {:unlatch, presses, about}}, _at_ms, s, _board) do
     if s.presses > presses do
       {s, [{:cast, :estop, {:unlatched, {:error, :pressed}, about}}]}
     else

@@ -17,8 +17,8 @@ defmodule Robot.Safety.LivenessMonitor do
   It counts looks instead of measuring time, so that a machine that was suspended, or whose
   processes all run slowly, is not taken for a robot that hangs.
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Robot.{Board, Names}
 
   @look_ms 50
@@ -75,7 +75,7 @@ defmodule Robot.Safety.LivenessMonitor do
   @doc "Starts the monitor of a robot whose board is running."
   @spec start_link(Robot.Config.t()) :: GenServer.on_start()
   def start_link(%Robot.Config{} = config),
-    do: HardenedServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
+    do: GenServer.start_link(__MODULE__, config, name: Names.via(config.id, :watch))
 
   @impl GenServer
   def init(%Robot.Config{id: id} = config) do

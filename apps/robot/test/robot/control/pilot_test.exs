@@ -22,6 +22,28 @@ defmodule Robot.Control.PilotTest do
     assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
   end
 
+  test "a start with options that its mission does not take is refused" do
+    id = robot(:pilot21)
+
+    assert Pilot.start(id, Acts.Mission, [1 | 2]) ==
+             {:error, "expected options [key: value], got [1 | 2]"}
+
+    assert Pilot.start(id, GenServer, []) == {:error, :no_mission}
+    assert {:idle, _data} = :sys.get_state(Names.whereis(id, :pilot))
+  end
+
+  test "a mission that gives an order that is none is ended, and the executive goes on" do
+    id = flown(:pilot22)
+    executive = Names.whereis(id, :executive)
+
+    pilot = Names.whereis(id, :pilot)
+    ref = Process.monitor(pilot)
+    Pilot.hear(id, {:command, {:do, :ready, [{:goal, 1, {No.Such.Behaviour, []}}]}})
+    assert_receive {:DOWN, ^ref, :process, ^pilot, _reason}, 5_000
+    _handled = :sys.get_state(executive)
+    assert Names.whereis(id, :executive) == executive
+  end
+
   test "hands ticks, outcomes, messages and commands to the mission" do
     id = flown(:pilot2)
     assert_receive {:mission, {:tick, %Robot.Percept{robot: ^id}}}

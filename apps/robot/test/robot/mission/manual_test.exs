@@ -18,6 +18,13 @@ defmodule Robot.Mission.ManualTest do
     mission
   end
 
+  test "a command that it does not know, or nobody could drive, changes nothing" do
+    mission = new()
+
+    for command <- [:junk, {:move, :fast, 0.0}, {:goto, 1.0e300, 0.0, nil}, {:find_blob, [1 | 2]}],
+        do: assert({:ready, ^mission, []} = Manual.handle({:command, command}, mission))
+  end
+
   test "each command is a goal of its own, and its outcome ends it" do
     {:goto, mission, [{:goal, tag, {Goto, x: 2.0, y: 1.0}} | _]} = tell(new(), "goto:2:1")
     {:goto, mission, [{:goal, next, _} | _]} = tell(mission, "goto:2:1")

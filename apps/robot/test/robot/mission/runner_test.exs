@@ -1,6 +1,7 @@
 defmodule Robot.Mission.RunnerTest do
   @moduledoc "A mission begins, hears, is halted and resumed; idle it hears nothing."
   use ExUnit.Case, async: true
+  alias Robot.Localiser.Anchors
   alias Robot.Mission.Runner
 
   defmodule Count do
@@ -12,7 +13,7 @@ defmodule Robot.Mission.RunnerTest do
       do: {:fresh, options[:from], [{:stage, :begun, %{robot: robot}}]}
 
     @impl Robot.Mission
-    def handle({:command, {:goal, goal}}, n), do: {:counting, n, [{:goal, :t, goal}]}
+    def handle({:command, {:order, order}}, n), do: {:counting, n, [order]}
 
     def handle(_event, n),
       do: {:counting, n + 1, [{:claim, %{heard: n + 1}}, {:send, :all, %{n: n}}]}
@@ -54,12 +55,25 @@ defmodule Robot.Mission.RunnerTest do
     assert Runner.resume(Runner.halt(fresh)) == {:error, :idle}
   end
 
-  test "a goal that is not one is the mission's fault" do
+  test "an order that is not one is the mission's fault" do
     {runner, _} = Runner.start(Runner.new(:mag1), Count, from: 0)
-    goal = {Robot.Behaviour.Goto, x: :far, y: 2.0}
+    give = fn order -> Runner.handle(runner, {:command, {:order, order}}) end
+
+    for order <- [
+          {:goal, :t, {No.Such.Behaviour, []}},
+          {:goal, :t, {Robot.Behaviour.Goto, [1 | 2]}},
+          {:goal, :t},
+          {:look, :left},
+          {:look, Bitwise.bsl(1, 80_000)},
+          {:anchors, %{}}
+        ],
+        do: assert_raise(ArgumentError, fn -> give.(order) end)
 
     assert_raise ArgumentError, ~r/option x: expected .*, got :far/, fn ->
-      Runner.handle(runner, {:command, {:goal, goal}})
+      give.({:goal, :t, {Robot.Behaviour.Goto, x: :far, y: 2.0}})
     end
+
+    for order <- [{:goal, :t, nil}, {:look, nil}, {:look, 1}, {:anchors, %Anchors{}}],
+        do: assert({_runner, [^order]} = give.(order))
   end
 end

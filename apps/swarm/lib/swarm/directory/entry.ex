@@ -3,8 +3,7 @@ defmodule Swarm.Directory.Entry do
   Keeps a role of a robot in the directory, for a role carries nothing out by itself: a companion (`Robot.Companion`) that
   is listed after it. Its options: `role:`, which is in the group `{role, robot}`, and `all:`, the group of all robots'.
   """
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Robot.Names
   alias Swarm.Directory
   alias Swarm.Directory.Membership
@@ -20,7 +19,7 @@ defmodule Swarm.Directory.Entry do
   @doc "Starts the process, as the robot's supervisor does."
   @spec start_link(robot :: atom(), role :: atom(), Directory.group()) :: GenServer.on_start()
   def start_link(robot, role, all) do
-    HardenedServer.start_link(__MODULE__, {robot, role, all},
+    GenServer.start_link(__MODULE__, {robot, role, all},
       name: Names.via(robot, {:directory, role})
     )
   end
@@ -60,7 +59,7 @@ defmodule Swarm.Directory.Entry do
     case {Membership.arrived(s.all, message), Membership.arrived(s.name, message)} do
       {{:ok, all}, :other} -> {:noreply, %{s | all: all}}
       {:other, {:ok, name}} -> {:noreply, %{s | name: name}}
-      {:other, :other} -> HardenedServer.drop(s)
+      {:other, :other} -> {:noreply, s}
     end
   end
 end

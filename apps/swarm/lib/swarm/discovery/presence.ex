@@ -8,8 +8,8 @@ defmodule Swarm.Discovery.Presence do
   exist. A robot whose connection ended, but that is still heard, joins again as soon as that is
   certain.
   """
-  use Hal.HardenedServer
-  alias Hal.{HardenedServer, Ticker}
+  use GenServer
+  alias Hal.Ticker
   alias Mesh.Nonblocking
   alias Swarm.Directory
   alias Swarm.Discovery.RobotInfo
@@ -25,7 +25,7 @@ defmodule Swarm.Discovery.Presence do
 
   @doc "Starts the process of this node."
   @spec start_link(term()) :: GenServer.on_start()
-  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc "Notifies the process from now on; returns the robots that are present now."
   @spec subscribe(pid()) :: {:ok, [atom()]} | {:error, line :: String.t()}
@@ -68,6 +68,10 @@ defmodule Swarm.Discovery.Presence do
     do: {:reply, {:error, "#{inspect(pid)} is not of this node: subscribe there"}, s}
 
   def handle_call({:unsubscribe, pid}, _from, s), do: {:reply, :ok, forget(s, pid)}
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
+  def handle_cast(_unknown, s), do: {:noreply, s}
 
   @impl GenServer
   def handle_info({ref, :join, {:robot, robot}, pids}, %{ref: ref} = s) do
@@ -108,6 +112,9 @@ defmodule Swarm.Discovery.Presence do
   end
 
   def handle_info({:DOWN, _ref, :process, pid, _reason}, s), do: {:noreply, forget(s, pid)}
+
+  # Such as news of a directory that has ended.
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   defp enter(s) do
     scope = Directory.monitor()

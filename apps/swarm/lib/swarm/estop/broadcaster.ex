@@ -11,8 +11,7 @@ defmodule Swarm.EStop.Broadcaster do
   the sender. A reset ends the repeats, so that they do not stop a robot that is switched on
   afterwards.
   """
-  use Hal.HardenedServer
-  alias Hal.HardenedServer
+  use GenServer
   alias Mesh.Nonblocking
   alias Robot.Names
   alias Swarm.Directory
@@ -26,7 +25,7 @@ defmodule Swarm.EStop.Broadcaster do
 
   @doc "Starts the process, as a node's supervisor does."
   @spec start_link(term()) :: GenServer.on_start()
-  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc "The identity of a new call."
   @spec call() :: Calls.call()
@@ -56,6 +55,9 @@ defmodule Swarm.EStop.Broadcaster do
 
   # It has a name that connected nodes can send to, so anything may arrive here.
   @impl GenServer
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
+  @impl GenServer
   def handle_cast({:repeat, call, times}, s) when times in 1..@times do
     if Calls.call?(call) do
       # Robots of this node need not pass it on.
@@ -79,6 +81,8 @@ defmodule Swarm.EStop.Broadcaster do
     {:noreply, %{s | left: Map.drop(s.left, over)}}
   end
 
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_info({:again, call}, s) do
     case s.left do
@@ -90,6 +94,8 @@ defmodule Swarm.EStop.Broadcaster do
         {:noreply, s}
     end
   end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   defp pass_on(%{left: left} = s, _call, _age_ms) when map_size(left) >= @most, do: s
 

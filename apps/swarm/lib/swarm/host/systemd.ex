@@ -14,15 +14,15 @@ defmodule Swarm.Host.Systemd do
   robot's id, `nil` for a node without one; `:period_ms`, how often it checks; `:pulse`, a
   function in place of `Swarm.Host.HealthCheck.of/1`.
   """
-  use Hal.HardenedServer
-  alias Hal.{HardenedServer, Ticker}
+  use GenServer
+  alias Hal.Ticker
   alias Swarm.Host.HealthCheck
 
   @period_ms 1_000
 
   @doc "Starts the process; `from_env/3` makes the options."
   @spec start_link(keyword()) :: GenServer.on_start()
-  def start_link(options), do: HardenedServer.start_link(__MODULE__, options)
+  def start_link(options), do: GenServer.start_link(__MODULE__, options)
 
   @doc """
   The options for a robot, from what systemd has put into the environment of the process `os_pid`;

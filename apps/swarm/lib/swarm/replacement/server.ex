@@ -3,9 +3,9 @@ defmodule Swarm.Replacement.Server do
   # Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
   # the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
   # its successor brings back the release.
-  use Hal.HardenedServer
+  use GenServer
   alias Swarm.Replacement
-  alias Hal.{Event, HardenedServer}
+  alias Hal.Event
   alias Mesh.{Nonblocking, Secret}
   alias Robot.{Board, Names}
   alias Robot.Control.{Delivery, Pilot}
@@ -18,7 +18,7 @@ defmodule Swarm.Replacement.Server do
 
   @doc "Starts the process of this node."
   @spec start_link(term()) :: GenServer.on_start()
-  def start_link(_options), do: HardenedServer.start_link(__MODULE__, [], name: __MODULE__)
+  def start_link(_options), do: GenServer.start_link(__MODULE__, [], name: __MODULE__)
 
   @doc """
   Signs bytes as this node's robots demand it: by the key of the fleet, or on a node without a mesh by one
@@ -87,6 +87,8 @@ defmodule Swarm.Replacement.Server do
       when is_binary(bytes) and node(caller) == node(),
       do: {:reply, {:ok, own(bytes, s)}, s}
 
+  def handle_call(_unknown, _from, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_cast(:keep, %{kept: kept} = s) when kept == %{},
     do: {:noreply, %{s | kept: Replacement.Code.keep()}}
@@ -114,6 +116,9 @@ defmodule Swarm.Replacement.Server do
   def handle_cast({:started, id, robot, result}, s),
     do: {:noreply, step(s, id, {:started, robot, result})}
 
+  # What a robot's comms process was asked, by any node, comes here as it is.
+  def handle_cast(_unknown, s), do: {:noreply, s}
+
   @impl GenServer
   def handle_info({:tick, tick}, %{tick: tick} = s) when tick != nil do
     s = Enum.reduce(s.fallen, s, &fallen/2)
@@ -131,6 +136,8 @@ defmodule Swarm.Replacement.Server do
     {what, s} = pop_in(s.monitors[monitor])
     {:noreply, ended(what, reason, s)}
   end
+
+  def handle_info(_unknown, s), do: {:noreply, s}
 
   defp turning(%{phase: :standing, robots: robots}),
     do: robots |> Map.keys() |> Enum.filter(&Entries.turns?/1)

@@ -7,8 +7,8 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
   Each crash is an event, `[:swarm, :part, :fell]`, with the part's `id` and the `reason`. If a
   part cannot be started with the node, the start of the node fails, as under any supervisor.
   """
-  use Hal.HardenedServer
-  alias Hal.{Event, HardenedServer}
+  use GenServer
+  alias Hal.Event
   alias Mesh.Backoff
 
   # Up to this many crashes within this time, restarts are immediate.
@@ -26,7 +26,7 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
 
   @doc "Starts the part, and keeps it running."
   @spec start_link(Supervisor.child_spec()) :: GenServer.on_start()
-  def start_link(spec), do: HardenedServer.start_link(__MODULE__, spec)
+  def start_link(spec), do: GenServer.start_link(__MODULE__, spec)
 
   @impl GenServer
   def init(%{id: id, start: start}) do
@@ -56,6 +56,9 @@ defmodule Swarm.Supervisor.BackoffSupervisor do
       {:error, _reason} -> {:noreply, later(s)}
     end
   end
+
+  # Of a part that did not start.
+  def handle_info({:EXIT, _pid, _reason}, s), do: {:noreply, s}
 
   @impl GenServer
   def terminate(_reason, %{pid: nil}), do: :ok

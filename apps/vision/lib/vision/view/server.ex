@@ -3,7 +3,7 @@ defmodule Vision.View.Server do
   # Runs the process of `Vision.View`: it connects `Vision.View.Subscribers`, which knows the viewers,
   # with `Vision.View.EncoderControl`, which encodes the pictures. It does not wait for a viewer,
   # the camera or ffmpeg.
-  use Hal.HardenedServer
+  use GenServer
   alias Hal.Frame
   alias Hal.Device.Words
   alias Vision.View.{EncoderControl, Subscribers}
