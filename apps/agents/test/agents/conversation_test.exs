@@ -52,6 +52,8 @@ defmodule Agents.ConversationTest do
     end
 
     for term <- [:junk, %{question(1) | epoch: -1}, {:x, 1}], do: send(pid, term)
+    GenServer.cast(pid, :junk)
+    send(pid, {:"$gen_call", {self(), make_ref()}, :junk})
     assert {:ok, %{content: 1}} = Conversation.request(peer, question(1))
     assert %{rejected: 3, waiting: 0} = Responder.counts(pid)
   end

@@ -43,6 +43,8 @@ defmodule Agents.TopicTest do
     for n <- 1..3, do: Topic.publish(:topic_urgent, :mag1, n)
     Topic.publish(:topic_urgent, :mag1, :stop, class: :urgent)
     for junk <- [:junk, %{__struct__: Envelope}, {:more, 1}], do: send(sub, junk)
+    GenServer.cast(sub, :junk)
+    send(sub, {:"$gen_call", {self(), make_ref()}, :junk})
     # Only its owner may ask.
     Task.await(Task.async(fn -> Topic.more(sub) end))
     assert %{rejected: 3, waiting: 4} = Topic.counts(sub)
