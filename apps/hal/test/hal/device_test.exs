@@ -160,7 +160,6 @@ defmodule Hal.DeviceTest do
     pid = device(:ptz)
     Device.look(pid, 0.5, 0.0)
     assert_receive {:ptz, {:look, 0.5, tilt}, ^pid} when tilt == 0.0
-    Device.drive(pid, Twist.zero())
     send(pid, {:readings, [{:ptz, %{pan: 0.5, tilt: 0.0, field_of_view: 1.0}}]})
     assert_receive {:ptz, %{pan: 0.5}}
   end

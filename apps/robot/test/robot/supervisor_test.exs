@@ -269,17 +269,6 @@ defmodule Robot.SupervisorTest do
     refute Enum.any?(parts(id, @above), &(&1 in above))
   end
 
-  test "looks that somebody else sends to the monitor end nobody" do
-    id = rolling(:fall_looks)
-    rolls()
-    running = parts(id, [:gate, :watch | @above])
-    watch = Names.whereis(id, :watch)
-    for _ <- 1..1_000, do: send(watch, :look)
-    for _ <- 1..1_000, do: send(watch, {:look, make_ref()})
-    _handled = :sys.get_state(watch)
-    assert parts(id, [:gate, :watch | @above]) == running
-  end
-
   test "the gate is stuck: the drive's own watchdog stops the wheels" do
     id = rolling(:fall6)
     rolls()

@@ -82,8 +82,7 @@ defmodule Robot.Safety.LivenessMonitor do
     board = Board.find!(id)
     for part <- @parts, do: forget(board, part)
 
-    {:ok,
-     schedule(%{config: config, board: board, parts: Map.new(@parts, &{&1, {nil, 0}}), look: nil})}
+    {:ok, schedule(%{config: config, board: board, parts: Map.new(@parts, &{&1, {nil, 0}})})}
   end
 
   # A note that an earlier monitor left about a silent part no longer holds.
@@ -93,7 +92,7 @@ defmodule Robot.Safety.LivenessMonitor do
   end
 
   @impl GenServer
-  def handle_info({:look, ref}, %{look: ref} = s) do
+  def handle_info(:look, s) do
     parts =
       for part <- @parts, into: %{} do
         {judged, watch} = look(s.parts[part], mark(s.board, s.config.id, part))
@@ -168,9 +167,7 @@ defmodule Robot.Safety.LivenessMonitor do
   defp schedule(%{config: %{pace: :manual}} = s), do: s
 
   defp schedule(s) do
-    # Nobody else knows the reference: looks that others sent would count as missed ticks.
-    ref = make_ref()
-    Process.send_after(self(), {:look, ref}, @look_ms)
-    %{s | look: ref}
+    Process.send_after(self(), :look, @look_ms)
+    s
   end
 end
