@@ -26,8 +26,8 @@ defmodule Swarm.MemberSpecTest do
       assert config.id == id
       assert config.arm == :manual
       assert config.mission == {Landmark, formation: {:column, 1.0}}
-      assert {Comms, _options} = List.last(config.companions)
-      assert config.send == {Comms, :say, [id]}
+      assert List.keymember?(config.companions, Comms, 0)
+      assert config.transport == {Swarm.Transport, :transmit, []}
       assert MemberSpec.mesh(file) == []
     end
   end

@@ -47,7 +47,8 @@ defmodule Swarm.MemberTest do
   end
 
   defp hear(member, term, at_ms \\ 100), do: elem(Member.step(member, {:message, term, at_ms}), 0)
-  defp rejected(member), do: member.receiver.rejected |> Map.values() |> Enum.sum()
+  defp receiver(member), do: Member.role(member, :comms).receiver
+  defp rejected(member), do: receiver(member).rejected |> Map.values() |> Enum.sum()
   defp deep(n), do: Enum.reduce(1..n, nil, fn _, term -> [term] end)
 
   defp junk do
@@ -159,7 +160,7 @@ defmodule Swarm.MemberTest do
         ] do
       before = member()
       later = hear(before, term)
-      assert later.receiver.rejected == %{reason => 1}, inspect(term, limit: 5)
+      assert receiver(later).rejected == %{reason => 1}, inspect(term, limit: 5)
       assert later.lockstep.roles.pilot.runner == before.lockstep.roles.pilot.runner
     end
   end
@@ -168,7 +169,7 @@ defmodule Swarm.MemberTest do
     %{body: claim} = Beat.pass_on(:mag2, @anchor)
 
     for {kind, body} <- [heartbeat: @beat, claim: claim, round: @letter],
-        do: assert(hear(member(), Message.new(:mag2, kind, body)).receiver.rejected == %{})
+        do: assert(receiver(hear(member(), Message.new(:mag2, kind, body))).rejected == %{})
   end
 
   test "an emergency stop spreads by heartbeats, and its own echo does not bring it back" do

@@ -16,7 +16,7 @@ defmodule Robot.Config do
       `:max_turn_acceleration` (rad/s2)
     * `:mission` - `{module, options}` that `Robot.Control.Pilot.start/1` starts, or `nil`
     * `:companions` - `[{module, options}]`, each a `Robot.Companion`
-    * `:send` - `{m, f, a}`; messages of the mission go to `apply(m, f, a ++ [to, message])`;
+    * `:transport` - `{m, f, a}`; messages to other robots go to `apply(m, f, a ++ [from, to, message])`;
       `nil` drops them
     * `:clock` - `{m, f, a}` that returns integer milliseconds, default the monotonic time
     * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
@@ -34,7 +34,8 @@ defmodule Robot.Config do
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`
 
-  `boot` is no option: `Robot.Host` sets it to the time of day at which a role starts (ns), which tells its lives apart.
+  `boot` is no option: `Robot.Host` sets it to the time of day at which a role starts (ns), which tells its lives apart,
+  unless a test has set it.
   """
   alias Hal.{Options, Pose, Profile}
   alias Robot.Fence
@@ -56,7 +57,7 @@ defmodule Robot.Config do
                 limits: [],
                 mission: nil,
                 companions: [],
-                send: nil,
+                transport: nil,
                 clock: {System, :monotonic_time, [:millisecond]},
                 pace: :clock,
                 arm: :auto,
@@ -85,7 +86,7 @@ defmodule Robot.Config do
           limits: keyword(),
           mission: module_options() | nil,
           companions: [module_options()],
-          send: call() | nil,
+          transport: call() | nil,
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
@@ -154,7 +155,7 @@ defmodule Robot.Config do
       limits: {:keys, @limits},
       mission: [:driver, default: nil],
       companions: {:list, :driver},
-      send: [:mfa, default: nil],
+      transport: [:mfa, default: nil],
       clock: :mfa,
       pace: {:one_of, [:clock, :manual]},
       arm: {:one_of, [:auto, :manual]},

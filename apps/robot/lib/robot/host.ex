@@ -7,10 +7,12 @@ defmodule Robot.Host do
   alias Hal.{Device, Event, Ticker}
   alias Robot.{Board, Names, Role, Trace}
   alias Robot.Control.Crash
-  alias Robot.Host.Phases
+  alias Robot.Host.{LoadShedder, Phases}
 
   @slow_us 50_000
   @dropped_every_ms 60_000
+  # The number of messages that are handled between two checks of the mailbox's length.
+  @look_every 64
 
   @doc "The process of a role as a child of the robot's supervisor."
   @spec child_spec({module(), Robot.Config.t()}) :: Supervisor.child_spec()
@@ -36,7 +38,8 @@ defmodule Robot.Host do
   def begin({role, config}) do
     board = Board.find!(config.id)
     at_ms = Robot.Config.now(config)
-    config = %{config | boot: config.boot || System.system_time(:nanosecond)}
+    trace = if role.name() in Trace.roles(), do: config.trace
+    config = %{config | trace: trace, boot: config.boot || System.system_time(:nanosecond)}
     {state, effects} = role.init(config, board, at_ms)
     period_ms = role.period_ms()
     ticker = period_ms && Robot.Config.ticker(config, :tick, period_ms)
@@ -46,6 +49,8 @@ defmodule Robot.Host do
       perceives?: function_exported?(role, :perceive, 3),
       foreign?: function_exported?(role, :foreign, 2),
       door?: function_exported?(role, :arrive, 3),
+      sheds?: function_exported?(role, :expendable?, 1),
+      unseen: 0,
       config: config,
       board: board,
       state: state,
@@ -100,7 +105,7 @@ defmodule Robot.Host do
 
     with input when input != :unknown <- whole(input, s),
          %{} = s <- hand(input, s, at_ms) do
-      s
+      relieved(s)
     else
       :unknown -> dropped(s)
     end
@@ -115,6 +120,16 @@ defmodule Robot.Host do
       %{s | dropped: {count + 1, at_ms + @dropped_every_ms}}
     else
       %{s | dropped: {count + 1, due_ms}}
+    end
+  end
+
+  defp relieved(%{sheds?: false} = s), do: s
+  defp relieved(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
+
+  defp relieved(s) do
+    case LoadShedder.relieve(&s.role.expendable?/1) do
+      0 -> %{s | unseen: 0}
+      dropped -> arrived({:cast, {:rejected, :flooded, dropped}}, %{s | unseen: 0})
     end
   end
 
@@ -212,8 +227,11 @@ defmodule Robot.Host do
   defp act({:disarm, then}, s, _at_ms),
     do: Device.disarm_later(Names.via(s.config.id, :drive), then)
 
-  defp act({:send, to, message}, s, _at_ms),
-    do: with({m, f, a} <- s.config.send, do: apply(m, f, a ++ [to, message]))
+  defp act({:send, to, message}, s, at_ms),
+    do: act({:cast, :comms, {:say, to, message}}, s, at_ms)
+
+  defp act({:transmit, to, message}, s, _at_ms),
+    do: with({m, f, a} <- s.config.transport, do: apply(m, f, a ++ [s.config.id, to, message]))
 
   defp act({:stage, stage, about}, s, at_ms),
     do: act({:event, [:robot, :stage], Map.put(about, :stage, stage)}, s, at_ms)

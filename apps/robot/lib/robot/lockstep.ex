@@ -226,7 +226,11 @@ defmodule Robot.Lockstep do
     do: {:board, Map.put(robot.board, :latch, {set?, at_ms})}
 
   defp act({:look, pan}, _role, _robot, _at_ms), do: {:out, {:look, pan, 0.0}}
-  defp act({:send, _to, _message} = effect, _role, _robot, _at_ms), do: {:out, effect}
+
+  defp act({:send, to, message}, role, _robot, _at_ms),
+    do: {:tell, {role, :comms, {:cast, {:say, to, message}}}}
+
+  defp act({:transmit, to, message}, _role, _robot, _at_ms), do: {:out, {:send, to, message}}
   defp act({:stage, _name, _about} = effect, _role, _robot, _at_ms), do: {:out, effect}
   defp act(:tick, role, robot, at_ms), do: {:now, hand(role, robot, :tick, at_ms)}
   defp act(_inside, _role, _robot, _at_ms), do: :ok

@@ -7,7 +7,7 @@ defmodule Robot.Role do
   |---|---|
   | `{:cast, message}` | what another part tells it |
   | `{:ask, from, message}` | the same, and somebody waits for `{:answer, from, result}`; `from` is `nil` in a recording |
-  | `:tick` | its time has come (`c:period_ms/0`); with `c:perceive/3`, what that makes of it |
+  | `:tick` | its time has come (`c:period_ms/0`); with `c:perceive/3`, `{:tick, what that sees}` |
 
   | effect | what a host does |
   |---|---|
@@ -23,7 +23,8 @@ defmodule Robot.Role do
   | `{:apply, then}`, `{:apply, then, more}` | tells a part that waits for this (`t:then/0`) |
   | `{:after, ms, message}` | hands the role this message as a cast, so much later |
   | `{:disarm, then}` | disarms the wheels, and tells a part that waits for this |
-  | `{:send, to, message}` | sends a message to other robots (`Robot.Config`, `:send`) |
+  | `{:send, to, message}` | hands the role `:comms` a message to other robots, as `{:cast, :comms, {:say, to, message}}` |
+  | `{:transmit, to, message}` | hands the transport such a message (`Robot.Config`) |
   | `{:stage, name, about}` | tells people a stage of the mission (event `[:robot, :stage]`) |
   | `{:phase, state}` | tells that the mission came to this state (event `[:robot, :pilot, :phase]`) |
   | `{:claim, claim}` | nothing: the claim is on the board; a recording shows it |
@@ -39,7 +40,7 @@ defmodule Robot.Role do
           {:cast, term()}
           | {:ask, from :: GenServer.from() | nil, term()}
           | :tick
-          | {:tick, Robot.Percept.t()}
+          | {:tick, seen :: Robot.Percept.t() | map()}
   @type state :: struct()
 
   @typedoc "What waits for a role: `{m, f, a}`, a role with its message, nothing, or what a recording has in place of these."
@@ -60,6 +61,7 @@ defmodule Robot.Role do
           | {:after, ms :: pos_integer(), message :: term()}
           | {:disarm, then()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
+          | {:transmit, to :: [atom()] | :all, struct()}
           | {:stage, atom(), map()}
           | {:phase, :idle | {module(), atom()}}
           | {:claim, map()}
@@ -93,7 +95,12 @@ defmodule Robot.Role do
   @callback foreign(input(), state()) :: module() | nil
   @doc "The phase that it is in, for a role that has phases: its process shows it (`Robot.Host.Phases`)."
   @callback phase(state()) :: term()
-  @optional_callbacks perceive: 3, foreign: 2, arrive: 3, phase: 1
+  @doc """
+  Whether a cast that waits may be dropped, for a role to which strangers send: its mailbox is kept short under a flood
+  (`Robot.Host.LoadShedder`), and it is told how many messages were dropped, as `{:cast, {:rejected, :flooded, count}}`.
+  """
+  @callback expendable?(message :: term()) :: boolean()
+  @optional_callbacks perceive: 3, foreign: 2, arrive: 3, phase: 1, expendable?: 1
 
   @doc "Handles one input. `:unknown` is an input that it does not know, which changes nothing."
   @callback handle(input(), at_ms :: integer(), state(), Board.t() | Board.entries()) ::

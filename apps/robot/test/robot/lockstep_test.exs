@@ -70,6 +70,7 @@ defmodule Robot.LockstepTest do
       {:apply, {Kernel, :send, [self(), :applied]}},
       {:answer, nil, :ok},
       {:send, :all, %{}},
+      {:transmit, :all, %{}},
       {:stage, :there, %{}}
     ]
 

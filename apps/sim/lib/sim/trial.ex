@@ -197,7 +197,7 @@ defmodule Sim.Trial do
   defp hear(trial) do
     {letters, radio} = Radio.receive(trial.radio, trial.at_ms)
 
-    Enum.reduce(letters, %{trial | radio: radio}, fn {to, _from, {message, checked}}, trial ->
+    Enum.reduce(letters, %{trial | radio: radio}, fn {to, _from, {message, marked}}, trial ->
       if Faults.any?(trial.faults, [:frozen, :deaf], to, trial.at_ms),
         do: trial,
         else:
@@ -205,7 +205,7 @@ defmodule Sim.Trial do
             trial,
             to,
             {:message, message, trial.at_ms},
-            &Member.hear(&1, checked, trial.at_ms)
+            &Member.step(&1, {:message, marked, trial.at_ms})
           )
     end)
   end

@@ -1,95 +1,110 @@
 defmodule Swarm.Comms do
   @moduledoc """
-  Sends and receives all messages of a robot; a companion of its pilot (`Robot.Companion`).
+  Sends and receives all messages of a robot: a role (`Robot.Role`) and a companion (`Robot.Companion`).
 
-  In: `Swarm.Message.check/1` checks every message; malformed ones are dropped and counted.
+  In: `Swarm.Message.check/1` checks every message at the door (`arrive/3`); malformed ones are dropped and counted.
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Out: the
-  mission's messages and, five times a second, a heartbeat with the robot's state from the board.
+  mission's messages and, five times a second, a heartbeat with the robot's state from the board; when the emergency
+  stop changes, one at once and then ten a second for a second, so that the change spreads within 200 ms.
 
-  An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started beside the comms process,
+  An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started before this role,
   owns the state of the stop and is told of each heartbeat that differs from it. Of two robots
   with the same name, the later one (`Swarm.Comms.NameClaim`) stops and falls silent, with the
   event `[:swarm, :comms, :duplicate_id]`, as long as there is the other.
 
-  | part | what it does |
+  | input | from |
   |---|---|
-  | `Swarm.Message.Receiver` | checks and sorts incoming messages |
-  | `Swarm.Comms.PeerWriter` | writes the peers to the board |
-  | `Swarm.Comms.Sender` | sends messages and heartbeats |
-  | `Swarm.Comms.CommandHandler` | answers people's commands that are not too old (`Swarm.Order.Freshness`), or passes them on |
-  | `Swarm.Comms.LoadShedder` | keeps the mailbox short |
+  | `{:hear, term}` | another robot, by any transport |
+  | `{:say, to, message}` | the mission: for a robot, several, or `:all` |
+  | `{:command, request, ref, order}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) |
+  | `{:stamp, ref}` | a sender on another node that will send an order |
+  | `{:rival, identity, comms}` | another robot of this name |
+  | `:stop` | the e-stop, which has changed |
+  | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`) |
 
-  `join/2` makes a config with a comms process. Its options:
+  `join/2` makes a config with this role. Its options:
 
     * `:transport` - `{m, f, a}`; a message goes to `apply(m, f, a ++ [from, to, message])`, with `to` a list of
-      robots or, for heartbeats, `:all`, and
-      arrives by `hear/2`. Default: `Swarm.Transport.transmit/3`
+      robots or `:all`, and arrives by `hear/2`. Default: `Swarm.Transport.transmit/3`
     * `:boot` - a number that grows with every start; by default the time of day
   """
-  use GenServer
-  alias Hal.{Event, Ticker}
-  alias Robot.Mission.{Claim, Letter}
-  alias Robot.{Board, Names}
-  alias Robot.Control.Pilot
   alias Mesh.Nonblocking
-  alias Swarm.{EStop, Message, Replacement}
-  alias Swarm.Order.Freshness
-  alias Swarm.Transport
+  alias Robot.{Board, Host, Names, Role}
+  alias Robot.Mission.{Claim, Letter}
+  alias Swarm.{Blackboard, Directory, EStop, Message, Replacement, Transport, Wire}
+  alias Swarm.Comms.{CommandHandler, NameClaim, OwnHeartbeat}
   alias Swarm.Discovery.RobotInfo
-  alias Swarm.Message.Receiver
-  alias Swarm.Wire
-  alias Swarm.Comms.{CommandHandler, LoadShedder, NameClaim, PeerWriter, Sender}
+  alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Message.{Checked, Receiver}
+  alias Swarm.Order.Freshness
 
   @behaviour Robot.Companion
+  @behaviour Robot.Role
 
   @tick_ms 100
   @rivals_every 10
-  # The number of messages that are handled between two checks of the mailbox's length.
-  @look_every 64
+  @urgent_ticks 10
+
+  @enforce_keys [:config, :receiver, :name, :held]
+  defstruct @enforce_keys ++
+              [gone: [], noted: nil, ticks: 0, sequence: 0, beat_ms: nil, urgent: 0, sent: 0]
+
+  @typedoc """
+  `receiver` holds what was heard; of the peers, `gone` are shown as gone. `sequence` is the number of its last heartbeat, at
+  `beat_ms`; `held` is what it last sent about the emergency stop, `urgent` how many faster heartbeats are left; `noted` is
+  what the blackboard has of this robot.
+  """
+  @type t :: %__MODULE__{
+          config: Robot.Config.t(),
+          receiver: Receiver.t(),
+          name: NameClaim.t(),
+          held: [EStop.State.tag()],
+          gone: [atom()],
+          noted: RobotInfo.noted(),
+          ticks: non_neg_integer(),
+          sequence: non_neg_integer(),
+          beat_ms: integer() | nil,
+          urgent: non_neg_integer(),
+          sent: non_neg_integer()
+        }
+
+  @typedoc """
+  What the process sees at a tick: what the blackboard should have of the robot, `nil` without one, and whether another robot
+  has the name that this one gave up.
+  """
+  @type seen :: %{about: RobotInfo.seen() | nil, taken?: boolean()}
 
   @doc """
-  Adds to the config of a robot a comms process, through which its mission sends messages, and an
-  e-stop process, which its gate notifies of its latch.
+  Adds to the config of a robot this role, through which its mission sends messages, and the
+  e-stop, which its gate notifies of its latch.
   """
   @spec join(Robot.Config.t(), keyword()) :: Robot.Config.t()
   def join(%Robot.Config{} = config, options \\ []) do
     options = Keyword.validate!(options, [:boot, transport: {Transport, :transmit, []}])
-    # The e-stop process first: a companion that is listed later restarts with those before it,
-    # but never restarts them.
-    companions = config.companions ++ [{EStop, []}, EStop.entry(), {__MODULE__, options}]
 
-    %{
-      config
-      | send: {__MODULE__, :say, [config.id]},
-        companions: companions
-    }
+    # The e-stop first: a companion that is listed later restarts with those before it, but never restarts them.
+    companions =
+      config.companions ++
+        [
+          {EStop, []},
+          EStop.entry(),
+          {__MODULE__, []},
+          {Directory.Entry, role: :comms, as: :robot}
+        ]
+
+    %{config | transport: options[:transport], boot: options[:boot], companions: companions}
   end
 
   @impl Robot.Companion
-  def child_spec({config, options}),
-    do: %{id: __MODULE__, start: {__MODULE__, :start_link, [config, options]}}
-
-  @doc "Starts the comms process of a robot, as its supervisor does."
-  @spec start_link(Robot.Config.t(), keyword()) :: GenServer.on_start()
-  def start_link(%Robot.Config{} = config, options) do
-    GenServer.start_link(__MODULE__, {config, options},
-      name: Names.via(config.id, :comms),
-      spawn_opt: [message_queue_data: :off_heap]
-    )
-  end
+  def child_spec({config, _options}), do: Host.child_spec({__MODULE__, config})
 
   @doc """
-  Sends a message to one robot, to several, or to all others, and returns the addressees: for
-  `:all` those that are known here (`Swarm.Transport.robots/0`). It waits for nobody, and
-  nobody confirms the message.
+  Sends a message of a robot of this node to one robot, to several, or to all others (`:all`). It does not wait, and no
+  robot confirms the message.
   """
-  @spec say(robot :: atom(), to, Message.t() | Letter.t() | Claim.t()) :: [atom()]
+  @spec say(robot :: atom(), to, Message.t() | Letter.t() | Claim.t()) :: :ok
         when to: atom() | [atom()] | :all
-  def say(robot, to, message) do
-    ids = List.delete(addressed(to), robot)
-    GenServer.cast(Names.via(robot, :comms), {:say, ids, Message.of(robot, message)})
-    ids
-  end
+  def say(robot, to, message), do: GenServer.cast(Names.via(robot, :comms), {:say, to, message})
 
   @doc "Passes on a message that arrived for a robot of this node, by any transport."
   @spec hear(robot :: atom(), term()) :: :ok
@@ -102,184 +117,252 @@ defmodule Swarm.Comms do
   def rival(robot, {_boot, _node} = other),
     do: GenServer.cast(Names.via(robot, :comms), {:rival, other, nil})
 
-  @impl GenServer
-  def init({%Robot.Config{id: id} = config, options}) do
-    board = Board.find!(id)
-    boot = options[:boot] || System.system_time(:millisecond)
-    transport = options[:transport] || {Transport, :transmit, []}
+  @impl Role
+  def name, do: :comms
 
-    s = %{
+  @impl Role
+  def period_ms, do: @tick_ms
+
+  @impl Role
+  def priority, do: :normal
+
+  # People's orders, the mission's messages and its own timers; the rest of a flood is repeated, or junk.
+  @impl Role
+  def expendable?(message),
+    do: not (is_tuple(message) and tuple_size(message) > 1 and elem(message, 0) in orders())
+
+  defp orders, do: [:command, :say, :rival, :stamp, :unanswered]
+
+  @impl Role
+  def init(%Robot.Config{id: id, boot: boot} = config, board, _at_ms) do
+    s = %__MODULE__{
       config: config,
-      id: id,
-      board: board,
       receiver: Receiver.new(id),
-      peer_writer: PeerWriter.new(board),
-      sender: Sender.new(config, board, transport, boot),
-      name: NameClaim.new(id, {boot, node()}),
-      unseen: 0,
-      noted: nil,
-      ticker: Robot.Config.ticker(config, :tick, @tick_ms)
+      name: NameClaim.new({boot, node()}),
+      held: EStop.written(board).held
     }
 
-    EStop.present(id, true)
-    Replacement.present(config, board)
-    {:ok, s, {:continue, :enter}}
+    # A life before this one may have given way.
+    {s, [{:apply, {EStop, :present, [id, true]}} | Replacement.present(config)]}
   end
 
-  @impl GenServer
-  def handle_continue(:enter, s), do: {:noreply, %{s | name: NameClaim.enter(s.name)}}
+  @doc """
+  An input as it is handled: messages are checked, people's orders get the time of their arrival. What is malformed counts as
+  a message that was rejected.
+  """
+  @impl Role
+  def arrive({:cast, message}, now_us, _board), do: {:cast, whole(message, now_us)}
+  def arrive(_other, _now_us, _board), do: {:cast, {:rejected, :not_a_message, 1}}
 
-  # Comms processes are found in the directory, so anything may arrive from anywhere: what would
-  # crash this process is counted instead.
-  @impl GenServer
-  def handle_call(_unknown, _from, s), do: {:noreply, reject(s)}
+  defp whole({:hear, term}, _now_us), do: {:heard, Checked.open(term)}
 
-  @impl GenServer
-  def handle_cast({:say, ids, %Message{} = message}, s) do
-    if Wire.names?(ids),
-      do: {:noreply, %{s | sender: Sender.speak(s.sender, ids, message)}},
-      else: {:noreply, reject(s)}
+  defp whole({:say, to, %kind{}} = message, _now_us)
+       when (is_list(to) or is_atom(to)) and kind in [Message, Letter, Claim],
+       do: if(Wire.names?(List.wrap(to)), do: message, else: malformed())
+
+  defp whole({:command, request, ref}, now_us), do: whole({:command, request, ref, nil}, now_us)
+
+  defp whole({:command, request, ref, order}, now_us) when is_reference(ref),
+    do: {:command, request, ref, Freshness.arrived(order, node(ref) == node()), now_us}
+
+  defp whole({:stamp, ref}, now_us) when is_reference(ref), do: {:stamp, ref, now_us}
+
+  defp whole({:rival, {boot, node}, comms} = message, _now_us)
+       when is_integer(boot) and is_atom(node) and (is_pid(comms) or comms == nil),
+       do: message
+
+  defp whole({:rejected, why}, _now_us) when is_atom(why), do: {:rejected, why, 1}
+
+  defp whole({:rejected, why, count} = message, _now_us)
+       when is_atom(why) and is_integer(count) and count > 0,
+       do: message
+
+  defp whole({:unanswered, ref, _answer} = message, _now_us) when is_reference(ref), do: message
+  defp whole(:stop, _now_us), do: :stop
+  defp whole(_unknown, _now_us), do: malformed()
+
+  defp malformed, do: {:rejected, :not_a_message, 1}
+
+  @impl Role
+  def perceive(_at_ms, s, board) do
+    taken? = s.name.left? and Directory.members({:robot, s.config.id}) != []
+    {:tick, %{about: RobotInfo.seen(board), taken?: taken?}}
   end
 
-  def handle_cast({:hear, term}, s) do
-    at_ms = Robot.Config.now(s.config)
-    {heard, receiver} = Receiver.hear(s.receiver, term, at_ms)
-    {:noreply, %{s | receiver: receiver} |> heard(heard, at_ms) |> relieve()}
+  @impl Role
+  def handle({:cast, {:heard, checked}}, at_ms, s, board) do
+    {heard, receiver} = Receiver.take(s.receiver, checked, at_ms)
+    s = %{s | receiver: receiver}
+    {s, heard(heard, s, at_ms, board)}
   end
 
-  def handle_cast({:command, request, ref}, s) when is_reference(ref),
-    do: {:noreply, command(s, request, ref, nil)}
+  def handle({:tick, seen}, at_ms, s, board) do
+    gone = Peers.gone(s.receiver.peers, at_ms)
+    shown = for id <- gone, id not in s.gone, do: show(s, id, at_ms, board)
+    s = %{s | gone: gone, ticks: s.ticks + 1}
+    {s, noted} = note(s, seen, board)
 
-  def handle_cast({:command, request, ref, order}, s) when is_reference(ref),
-    do: {:noreply, command(s, request, ref, order)}
-
-  def handle_cast({:stamp, ref}, s) when is_reference(ref) do
-    Nonblocking.answer(ref, Freshness.stamp(s.sender.boot, now_us()))
-    {:noreply, s}
+    counts = %{sent: s.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
+    s = urged(s, board)
+    due? = s.urgent > 0 or Heartbeat.due?(s.beat_ms, at_ms)
+    {s, beats} = if due?, do: beat(s, at_ms, board), else: {s, []}
+    {s, rivals} = rivals(%{s | urgent: max(s.urgent - 1, 0)}, seen, at_ms)
+    {s, noted ++ shown ++ [{:put, :radio, counts}] ++ beats ++ rivals}
   end
 
-  def handle_cast(:stop, s), do: {:noreply, %{s | sender: Sender.urge(s.sender, s.receiver)}}
+  def handle({:cast, {:say, to, message}}, _at_ms, %{config: %{id: id}} = s, _board) do
+    to = if to == :all, do: :all, else: List.delete(List.wrap(to), id)
+    speak(s, to, Message.of(id, message))
+  end
 
-  def handle_cast({:rejected, why}, s) when is_atom(why),
-    do: {:noreply, %{s | receiver: Receiver.reject(s.receiver, why)}}
-
-  def handle_cast({:rival, {boot, node} = other, comms}, s)
-      when is_integer(boot) and is_atom(node) and (is_pid(comms) or comms == nil) do
-    case NameClaim.rival(s.name, other, comms, Robot.Config.now(s.config)) do
-      {false, name} -> {:noreply, %{s | name: name}}
-      {true, name} -> {:noreply, give_way(%{s | name: name}, node)}
+  def handle({:cast, :stop}, at_ms, s, board) do
+    case urged(s, board) do
+      ^s -> {s, []}
+      hurried -> beat(hurried, at_ms, board)
     end
   end
 
-  def handle_cast(_unknown, s), do: {:noreply, reject(s)}
+  def handle({:cast, {:command, request, ref, order, now_us}}, at_ms, s, board) do
+    # The e-stop itself knows what a reset is meant for.
+    stopped = if EStop.takes?(request), do: nil, else: EStop.stopped(board)
 
-  @impl GenServer
-  def handle_info(:tick, s), do: {:noreply, s |> tick(Robot.Config.now(s.config)) |> schedule()}
-
-  # The time for the drive's answer is over.
-  def handle_info({:unanswered, ref, answer}, s) when is_reference(ref) do
-    Nonblocking.answer(ref, answer)
-    {:noreply, s}
-  end
-
-  def handle_info(message, s) do
-    case NameClaim.arrived(s.name, message) do
-      {:ok, name} -> {:noreply, %{s | name: name}}
-      :other -> {:noreply, reject(s)}
-    end
-  end
-
-  defp heard(s, {:heartbeat, id, beat}, at_ms) do
-    EStop.heard(s.id, s.board, beat)
-    %{s | peer_writer: PeerWriter.heard(s.peer_writer, s.receiver.peers, id, at_ms)}
-  end
-
-  defp heard(s, {:message, message}, _at_ms) do
-    Pilot.hear(s.id, {:message, message})
-    s
-  end
-
-  defp heard(s, :nothing, _at_ms), do: s
-
-  defp tick(s, at_ms) do
-    s = note(s)
-    s = %{s | peer_writer: PeerWriter.grow_old(s.peer_writer, s.receiver.peers, at_ms)}
-    counts = %{sent: s.sender.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
-    Board.put(s.board, :comms, :radio, counts, at_ms)
-    s = %{s | sender: Sender.tick(s.sender, s.receiver, at_ms)}
-    if rem(s.sender.ticks, @rivals_every) == 0, do: rivals(s, at_ms), else: s
-  end
-
-  defp rivals(s, at_ms) do
-    NameClaim.challenge(s.name)
-
-    case NameClaim.take_back(s.name, at_ms) do
-      {true, name} -> take_back(%{s | name: name})
-      {false, name} -> %{s | name: name}
-    end
-  end
-
-  defp note(s) do
-    noted =
-      if NameClaim.left?(s.name),
-        do: RobotInfo.leave(s.noted, s.id),
-        else: RobotInfo.note(s.noted, s.config, s.board, s.sender.boot, s.receiver)
-
-    %{s | noted: noted}
-  end
-
-  # A sender that knows only the comms process reaches the e-stop process through it.
-  defp command(s, request, ref, order) do
-    here? = node(ref) == node()
-    # The e-stop process itself knows what a reset is meant for.
-    stopped = if EStop.takes?(request), do: nil, else: EStop.stopped(s.board)
-
-    case Freshness.judge(s.sender.boot, request, order, here?, now_us(), stopped) do
-      {:ok, asked} ->
-        cond do
-          EStop.takes?(request) -> EStop.take(s.id, request, {ref, asked})
-          Replacement.takes?(request) -> Replacement.take(s.id, request, order, ref)
-          true -> CommandHandler.take(request, {ref, asked}, s.config, s.board, s.receiver)
-        end
-
-        s
+    case Freshness.judge(s.config.boot, request, order, true, now_us, stopped) do
+      {:ok, asked_us} ->
+        {s, command(request, {ref, asked_us, now_us}, order, s, at_ms, board)}
 
       {:error, why} ->
-        Nonblocking.answer(ref, Freshness.refusal(s.id, why))
-        %{s | receiver: Receiver.reject(s.receiver, :too_old)}
+        {reject(s, :too_old, 1), [answer(ref, Freshness.refusal(s.config.id, why))]}
     end
   end
 
-  defp now_us, do: System.monotonic_time(:microsecond)
+  def handle({:cast, {:stamp, ref, now_us}}, _at_ms, s, _board),
+    do: {s, [answer(ref, Freshness.stamp(s.config.boot, now_us))]}
 
-  defp give_way(s, other) do
-    EStop.present(s.id, false)
-    Pilot.halt(s.id)
-    Event.execute([:swarm, :comms, :duplicate_id], %{}, %{robot: s.id, other: other})
-    %{s | sender: %{s.sender | silent?: true}}
-  end
+  # The time for the drive's answer is over.
+  def handle({:cast, {:unanswered, ref, answer}}, _at_ms, s, _board),
+    do: {s, [answer(ref, answer)]}
 
-  # It stands until somebody gives it an order.
-  defp take_back(s) do
-    EStop.present(s.id, true)
-    Event.execute([:swarm, :comms, :unique_id], %{}, %{robot: s.id})
-    %{s | sender: %{s.sender | silent?: false}}
-  end
+  def handle({:cast, {:rejected, why, count}}, _at_ms, s, _board), do: {reject(s, why, count), []}
 
-  defp addressed(:all), do: Transport.robots()
-  defp addressed(ids) when is_list(ids), do: ids
-  defp addressed(id), do: [id]
+  def handle({:cast, {:rival, {_boot, node} = other, comms}}, at_ms, s, _board) do
+    case NameClaim.rival(s.name, other, comms, at_ms) do
+      {:give_way, name} ->
+        {%{s | name: name}, give_way(s.config.id, node)}
 
-  defp reject(s), do: relieve(%{s | receiver: Receiver.reject(s.receiver, :not_a_message)})
+      {:tell, name} ->
+        {%{s | name: name}, [{:apply, {__MODULE__, :tell_rival, [comms, name.me]}}]}
 
-  defp relieve(%{unseen: unseen} = s) when unseen < @look_every, do: %{s | unseen: unseen + 1}
-
-  defp relieve(s) do
-    case LoadShedder.relieve([:tick | NameClaim.timers(s.name)]) do
-      0 -> %{s | unseen: 0}
-      dropped -> %{s | unseen: 0, receiver: Receiver.reject(s.receiver, :flooded, dropped)}
+      {:stay, name} ->
+        {%{s | name: name}, []}
     end
   end
 
-  defp schedule(s), do: %{s | ticker: Ticker.next(s.ticker)}
+  def handle(_unknown, _at_ms, _s, _board), do: :unknown
+
+  defp heard({:heartbeat, id, %{estop: tags}}, s, at_ms, board) do
+    shown = show(s, id, at_ms, board)
+
+    if tags != [] and EStop.news?(EStop.written(board), tags),
+      do: [{:cast, :estop, {:beat, tags}}, shown],
+      else: [shown]
+  end
+
+  defp heard({:message, message}, _s, _at_ms, _board), do: [{:cast, :pilot, {:message, message}}]
+  defp heard(:nothing, _s, _at_ms, _board), do: []
+
+  # A hundred robots send each other fifty thousand heartbeats a second, so only the row of this one is written.
+  defp show(s, id, at_ms, board),
+    do: {:apply, {__MODULE__, :show_peer, [board, s.receiver.peers, id, at_ms]}}
+
+  @doc false
+  def show_peer(board, peers, id, at_ms) do
+    peer = Peers.percept(peers, id, at_ms)
+    Board.put(board, :comms, {:peer, id}, peer, peer.at_ms)
+  end
+
+  # Beside a fleet in lockstep there is no blackboard.
+  defp note(s, %{about: nil}, _board), do: {s, []}
+  defp note(%{name: %{left?: true}, noted: nil} = s, _seen, _board), do: {s, []}
+
+  # It then receives the rows of the other.
+  defp note(%{name: %{left?: true}} = s, _seen, _board),
+    do: {%{s | noted: nil}, [{:apply, {Blackboard, :leave, [s.config.id]}}]}
+
+  defp note(s, %{about: about}, board) do
+    {due?, noted} = RobotInfo.due(s.noted, about)
+    written = {:apply, {RobotInfo, :write, [s.config, board, s.receiver]}}
+    {%{s | noted: noted}, if(due?, do: [written], else: [])}
+  end
+
+  # A robot that has fallen silent does not speak.
+  defp speak(%{name: %{left?: true}} = s, _to, _message), do: {s, []}
+  defp speak(s, to, message), do: {%{s | sent: s.sent + 1}, [{:transmit, to, message}]}
+
+  # If a test or a trial decides when a robot acts, the next heartbeat carries it.
+  defp urged(%{config: %{pace: :manual}} = s, _board), do: s
+
+  defp urged(s, board) do
+    case EStop.written(board).held do
+      same when same == s.held -> s
+      held -> %{s | held: held, urgent: @urgent_ticks}
+    end
+  end
+
+  defp beat(s, at_ms, board) do
+    from = {s.config.boot, s.sequence + 1}
+
+    case OwnHeartbeat.message(s.config, board, s.receiver, from, at_ms) do
+      {:ok, message} -> speak(%{s | sequence: s.sequence + 1, beat_ms: at_ms}, :all, message)
+      :error -> {s, []}
+    end
+  end
+
+  defp rivals(s, _seen, _at_ms) when rem(s.ticks, @rivals_every) != 0, do: {s, []}
+
+  defp rivals(%{name: %{left?: false}} = s, _seen, _at_ms),
+    do: {s, [{:apply, {__MODULE__, :challenge, [s.config.id, s.name.me]}}]}
+
+  # It stands until it gets an order.
+  defp rivals(%{config: %{id: id}} = s, %{taken?: taken?}, at_ms) do
+    case NameClaim.take_back(s.name, taken?, at_ms) do
+      {true, name} -> {%{s | name: name}, present(id, true) ++ [{:event, event(:unique_id), %{}}]}
+      {false, name} -> {%{s | name: name}, []}
+    end
+  end
+
+  defp give_way(id, other) do
+    present(id, false) ++
+      [{:cast, :pilot, {:halt, nil}}, {:event, event(:duplicate_id), %{other: other}}]
+  end
+
+  defp event(name), do: [:swarm, :comms, name]
+
+  defp present(id, present?) do
+    [
+      {:apply, {Directory.Entry, :present, [id, :comms, present?]}},
+      {:apply, {EStop, :present, [id, present?]}}
+    ]
+  end
+
+  @doc false
+  # Tells all others of the same name the identity of this robot.
+  def challenge(id, me) do
+    for comms <- Directory.members({:robot, id}), comms != self(), do: tell_rival(comms, me)
+    :ok
+  end
+
+  @doc false
+  def tell_rival(comms, me), do: Nonblocking.cast(comms, {:rival, me, self()})
+
+  # A sender that knows only this process reaches the e-stop through it.
+  defp command(request, {ref, asked_us, _now_us} = given, order, s, at_ms, board) do
+    cond do
+      EStop.takes?(request) -> [{:cast, :estop, {:in_time, request, ref, asked_us}}]
+      Replacement.takes?(request) -> [Replacement.take(s.config.id, request, order, ref)]
+      true -> CommandHandler.take(request, given, s, at_ms, board)
+    end
+  end
+
+  defp answer(ref, answer), do: {:apply, {Nonblocking, :answer, [ref, answer]}}
+  defp reject(s, why, count), do: %{s | receiver: Receiver.reject(s.receiver, why, count)}
 end

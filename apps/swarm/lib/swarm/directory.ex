@@ -8,7 +8,7 @@ defmodule Swarm.Directory do
   |---|---|
   | `{:robot, :mag1}` | the comms process of that robot |
   | `{:estop, :mag1}` | its e-stop process |
-  | `:robots`, `:estops` | the comms processes of all robots, their e-stop processes |
+  | `:estops` | the e-stop processes of all robots |
   | `{:team, :blue}` | the processes that entered it |
   | `{:service, :camera}`, `{:service, :camera, :mag1}` | the processes that offer it (`Agents.Responder`); that of one robot |
   | `{:topic, :poses}` | the subscribers (`Agents.Topic`) |
@@ -17,8 +17,7 @@ defmodule Swarm.Directory do
   entered monitors it (`monitor/0`), and enters again.
   """
   @type group ::
-          :robots
-          | :estops
+          :estops
           | {:robot, atom()}
           | {:estop, atom()}
           | {:team, atom()}

@@ -1,7 +1,6 @@
 defmodule Swarm.Member do
   @moduledoc """
-  Runs one robot of a fleet as one pure function: its roles (`Robot.Lockstep`), and what `Swarm.Comms` does live: it hears
-  its peers, and tells them how it is. `Sim.Trial` folds it in lockstep.
+  Runs one robot of a fleet as one pure function: its roles, by `Robot.Lockstep`. `Sim.Trial` folds it in lockstep.
 
   | input | from |
   |---|---|
@@ -9,7 +8,7 @@ defmodule Swarm.Member do
   | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person |
-  | `{:tick, at_ms}` | the clock, 10 Hz: controller, then mission, then (5 Hz) the heartbeat |
+  | `{:tick, at_ms}` | the clock, 10 Hz: executive, then pilot, then comms |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
   | `{:crash, role, at_ms}` | a fault: this role begins anew, and those behind it, as under their supervisor |
   | `{:hang, {role, until_ms}, at_ms}` | a fault: what arrives at executive or pilot waits; after 2 s it is killed |
@@ -20,10 +19,9 @@ defmodule Swarm.Member do
   alias Robot.Control.{Controller, Delivery, Executive, Pilot}
   alias Robot.Mission.{Manual, Runner}
   alias Robot.Safety.Gate
-  alias Swarm.Comms.{CommandHandler, OwnHeartbeat}
-  alias Swarm.{EStop, Message}
-  alias Swarm.Membership.{Heartbeat, Peers}
-  alias Swarm.Message.Receiver
+  alias Swarm.Comms.CommandHandler
+  alias Swarm.{Comms, EStop}
+  alias Swarm.Membership.Peers
 
   # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
   defguardp is_alone(command)
@@ -39,21 +37,13 @@ defmodule Swarm.Member do
                         :run
                       ])
 
-  @roles [Gate, Executive, Pilot, EStop]
+  @roles [Gate, Executive, Pilot, EStop, Comms]
 
-  @enforce_keys [:lockstep, :receiver]
-  defstruct @enforce_keys ++ [sequence: 0, beat_ms: nil]
+  @enforce_keys [:lockstep]
+  defstruct @enforce_keys
 
-  @typedoc """
-  `lockstep` are its roles; `receiver` holds what was heard: peers, rejected messages; `sequence` is the number of the last
-  heartbeat of this life, at `beat_ms`.
-  """
-  @type t :: %__MODULE__{
-          lockstep: Lockstep.t(),
-          receiver: Receiver.t(),
-          sequence: non_neg_integer(),
-          beat_ms: integer() | nil
-        }
+  @typedoc "`lockstep` are its roles."
+  @type t :: %__MODULE__{lockstep: Lockstep.t()}
 
   @type input ::
           {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
@@ -62,7 +52,7 @@ defmodule Swarm.Member do
           | {:command, term(), integer()}
           | {:tick, integer()}
           | {:reflex, integer()}
-          | {:crash, :gate | :executive | :pilot | :estop, integer()}
+          | {:crash, :gate | :executive | :pilot | :estop | :comms, integer()}
           | {:hang, {:executive | :pilot, until_ms :: integer()}, integer()}
 
   @type effect :: Lockstep.effect()
@@ -85,7 +75,8 @@ defmodule Swarm.Member do
 
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
     given = Keyword.take(options, [:id, :profile, :start, :plan, :mission, :boot])
-    config = struct!(Robot.Config, given ++ [drive: {__MODULE__, []}, ptz: {__MODULE__, []}])
+    others = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}, pace: :manual]
+    config = struct!(Robot.Config, given ++ others)
     board = %{arming: {%{state: :armed, why: nil}, 0}}
     lockstep = Lockstep.new(config, @roles, board, options[:order])
 
@@ -93,16 +84,14 @@ defmodule Swarm.Member do
     {runner, []} = Runner.start(runner, module, mission_options)
     begun = [runner: runner, state: Runner.state(runner), options: mission_options]
 
-    %__MODULE__{
-      lockstep: update_in(lockstep.roles.pilot, &struct!(&1, begun)),
-      receiver: Receiver.new(options[:id])
-    }
+    %__MODULE__{lockstep: update_in(lockstep.roles.pilot, &struct!(&1, begun))}
   end
 
   @doc "Handles one input, and returns the effects."
   @spec step(t(), input()) :: {t(), [effect()]}
-  def step(member, {:crash, role, at_ms}) when role in [:gate, :executive, :pilot, :estop],
-    do: by(member, Lockstep.crash(member.lockstep, role, at_ms))
+  def step(member, {:crash, role, at_ms})
+      when role in [:gate, :executive, :pilot, :estop, :comms],
+      do: by(member, Lockstep.crash(member.lockstep, role, at_ms))
 
   def step(member, {:hang, {role, until_ms}, at_ms}) when role in [:executive, :pilot],
     do: by(member, Lockstep.hang(member.lockstep, role, until_ms, at_ms))
@@ -115,7 +104,8 @@ defmodule Swarm.Member do
   def step(member, {:detections, detections}),
     do: {put(member, :detections, detections, detections.at_ms), []}
 
-  def step(member, {:message, term, at_ms}), do: hear(member, Message.check(term), at_ms)
+  def step(member, {:message, term, at_ms}),
+    do: input(member, :comms, {:cast, {:hear, term}}, at_ms)
 
   def step(member, {:command, command, at_ms}) do
     with false <- EStop.takes?(command),
@@ -136,27 +126,19 @@ defmodule Swarm.Member do
   def step(member, {:tick, at_ms}) do
     {member, woken} = woken(member, at_ms)
     {member, effects} = input(member, :executive, {:tick, percept(member, at_ms)}, at_ms)
-    {member, beats} = beat(member, at_ms)
+    # There is no blackboard, and no other robot has its name.
+    {member, beats} = input(member, :comms, {:tick, %{about: nil, taken?: false}}, at_ms)
     {member, woken ++ effects ++ beats}
   end
 
   def step(member, {:reflex, at_ms}), do: input(member, :gate, :tick, at_ms)
-
-  @doc """
-  The same as `step/2` for a message that was checked before (`Swarm.Message.check/1`): once for all members that hear it.
-  """
-  @spec hear(t(), {:ok, Message.t()} | {:error, atom()}, integer()) :: {t(), [effect()]}
-  def hear(member, checked, at_ms) do
-    {heard, receiver} = Receiver.take(member.receiver, checked, at_ms)
-    heard(%{member | receiver: receiver}, heard, at_ms)
-  end
 
   @doc "Its name."
   @spec id(t()) :: atom()
   def id(member), do: member.lockstep.config.id
 
   @doc "The state of one of its roles."
-  @spec role(t(), :gate | :executive | :pilot | :estop) :: Robot.Role.state()
+  @spec role(t(), :gate | :executive | :pilot | :estop | :comms) :: Robot.Role.state()
   def role(member, role), do: Map.fetch!(member.lockstep.roles, role)
 
   @doc "Its mission (`Robot.Mission.Runner`)."
@@ -202,38 +184,13 @@ defmodule Swarm.Member do
 
   defp ways(_other, _member), do: {:ok, [{:hand, {:except, Manual}}]}
 
-  defp heard(member, {:message, message}, at_ms),
-    do: input(member, :pilot, {:cast, {:message, message}}, at_ms)
-
-  defp heard(member, :nothing, _at_ms), do: {member, []}
-
-  defp heard(member, {:heartbeat, _id, beat}, at_ms) do
-    if EStop.news?(role(member, :estop).stop, beat.estop),
-      do: input(member, :estop, {:cast, {:beat, beat.estop}}, at_ms),
-      else: {member, []}
-  end
-
   defp input(member, role, input, at_ms),
     do: by(member, Lockstep.input(member.lockstep, role, input, at_ms))
 
   defp woken(%{lockstep: %{hung: hung}} = member, _at_ms) when hung == %{}, do: {member, []}
   defp woken(member, at_ms), do: by(member, Lockstep.wake(member.lockstep, at_ms))
 
-  defp by(member, {lockstep, effects}) do
-    %{id: id, boot: boot} = lockstep.config
-
-    # Its comms comes behind all that can crash, and begins a new life, too.
-    member =
-      if boot == member.lockstep.config.boot,
-        do: member,
-        else: %{member | sequence: 0, beat_ms: nil, receiver: Receiver.new(id)}
-
-    {%{member | lockstep: lockstep},
-     Enum.map(effects, fn
-       {:send, to, body} -> {:send, to, Message.of(id, body)}
-       other -> other
-     end)}
-  end
+  defp by(member, {lockstep, effects}), do: {%{member | lockstep: lockstep}, effects}
 
   defp put(member, key, value, at_ms),
     do: %{member | lockstep: Lockstep.put(member.lockstep, key, value, at_ms)}
@@ -242,26 +199,15 @@ defmodule Swarm.Member do
   What the robot knows for a tick at this time, before it has estimated its pose.
   """
   @spec percept(t(), integer()) :: Percept.t()
-  def percept(%{lockstep: %{config: config, board: board}} = member, at_ms) do
+  def percept(%{lockstep: %{config: config, board: board, roles: %{comms: comms}}}, at_ms) do
     Percept.Snapshot.build(
       %Percept{
         robot: config.id,
         at_ms: at_ms,
         profile: config.profile,
-        peers: Peers.percepts(member.receiver.peers, at_ms)
+        peers: Peers.percepts(comms.receiver.peers, at_ms)
       },
       &Board.fetch(board, &1, &2, at_ms)
     )
-  end
-
-  defp beat(%{lockstep: %{config: config, board: board}} = member, at_ms) do
-    from = {config.boot, member.sequence + 1}
-
-    with true <- Heartbeat.due?(member.beat_ms, at_ms),
-         {:ok, message} <- OwnHeartbeat.message(config, board, member.receiver, from, at_ms) do
-      {%{member | sequence: member.sequence + 1, beat_ms: at_ms}, [{:send, :all, message}]}
-    else
-      _not_due_or_lost -> {member, []}
-    end
   end
 end

@@ -17,7 +17,7 @@ defmodule Swarm.Replacement do
   only where it says `replace: :code`, on simulated robots, too.
   """
   alias Hal.Options.Wording
-  alias Robot.Board
+  alias Robot.{Board, Role}
   alias Swarm.{Missions, Replacement}
   alias Swarm.Replacement.Order
 
@@ -76,18 +76,19 @@ defmodule Swarm.Replacement do
   def takes?({:replace, _content, _mac}), do: true
   def takes?(_other), do: false
 
-  @doc "Passes on a request to this robot from its comms process, which has judged its stamp."
-  @spec take(robot :: atom(), request :: tuple(), Order.stamp(), reference()) :: :ok
+  @doc "The effect of a request to this robot, of which its comms has judged the stamp."
+  @spec take(robot :: atom(), request :: tuple(), Order.stamp(), reference()) :: Role.effect()
   def take(robot, request, stamp, ref),
-    do: GenServer.cast(Replacement.Server, {:take, robot, request, stamp, ref})
+    do: cast({:take, robot, request, stamp, ref})
 
-  @doc "Writes on the robot's board what its config says; called by its comms process at its start."
-  @spec present(Robot.Config.t(), Board.t()) :: :ok
-  def present(config, board) do
+  @doc "The effects with which its comms starts: what the robot's config says comes on its board."
+  @spec present(Robot.Config.t()) :: [Role.effect()]
+  def present(config) do
     about = %{mission: config.mission, replace: config.replace}
-    :ok = Board.put(board, :comms, :release, about, Robot.Config.now(config))
-    if config.replace, do: GenServer.cast(Replacement.Server, :keep), else: :ok
+    [{:put, :release, about} | if(config.replace, do: [cast(:keep)], else: [])]
   end
+
+  defp cast(message), do: {:apply, {GenServer, :cast, [Replacement.Server, message]}}
 
   @doc "The config with the mission that was put in the place of its own, if any."
   @spec config(Robot.Config.t(), Board.t()) :: Robot.Config.t()

@@ -22,10 +22,13 @@ defmodule Swarm.Transport do
   end
 
   @doc """
-  The transport of `Swarm.Comms`: sends to these robots, or to all others that can be reached
-  without asking which these are. Waits for nobody.
+  The transport of `Swarm.Comms`: sends to these robots, or to all others that can be reached; a heartbeat
+  without asking which these are. Waits for no process.
   """
   @spec transmit(from :: atom(), :all | [atom()], Message.t()) :: :ok
+  def transmit(from, :all, %Message{kind: kind} = message) when kind != :heartbeat,
+    do: transmit(from, List.delete(robots(), from), message)
+
   def transmit(from, to, %Message{} = message) do
     if Mesh.running?(),
       do: by_mesh(from, to, message),

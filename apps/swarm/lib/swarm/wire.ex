@@ -96,7 +96,7 @@ defmodule Swarm.Wire do
   def counter?(term), do: is_integer(term) and term in 0..@counter
 
   @doc """
-  Whether a term is the number of a robot's life: the time of day at which it began, in ms.
+  Whether a term is the number of a robot's life: the time of day at which it began, in ns.
 
       iex> for term <- [1, 1_700_000_000_000, -1, 1.0e12], do: Swarm.Wire.boot?(term)
       [true, true, false, false]

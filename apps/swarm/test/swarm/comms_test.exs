@@ -242,35 +242,28 @@ defmodule Swarm.CommsTest do
     :ok = Directory.enter(self(), [{:robot, id}])
     GenServer.cast(comms, {:rival, {500, node()}, self()})
     assert_receive {:event, %{robot: ^id}}
-    assert Directory.members({:robot, id}) == [self()]
+    until(id, fn _ -> Directory.members({:robot, id}) == [self()] end)
     {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
     :ok = Directory.leave(self(), [{:robot, id}])
   end
 
   test "a name is taken back when the other robot has not been heard for ten seconds" do
-    id = :"comms20_#{System.unique_integer([:positive])}"
-    name = NameClaim.enter(NameClaim.new(id, {1_000, node()}))
+    name = NameClaim.new({1_000, node()})
     # One heartbeat from another node in its name, with the lowest number of a life.
-    assert {true, name} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
-    assert Directory.members({:robot, id}) == []
-    assert {false, name} = NameClaim.take_back(name, 9_999)
+    assert {:give_way, %{left?: true} = name} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
+    assert {false, name} = NameClaim.take_back(name, false, 9_999)
     # Later lives, and itself, do not count; as long as the first is heard, it stays away.
-    assert {false, name} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)
-    assert {false, name} = NameClaim.rival(name, {0, :twin@far}, nil, 9_000)
-    assert {false, name} = NameClaim.take_back(name, 18_999)
+    assert {:stay, name} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)
+    assert {:stay, name} = NameClaim.rival(name, {0, :twin@far}, nil, 9_000)
+    assert {false, name} = NameClaim.take_back(name, false, 18_999)
 
     # One that is known by the directory alone is there, too.
-    other = spawn_link(fn -> receive(do: (:never -> :ok)) end)
-    :ok = Directory.enter(other, [{:robot, id}])
-    assert {false, name} = NameClaim.take_back(name, 19_000)
-    :ok = Directory.leave(other, [{:robot, id}])
-    assert {false, name} = NameClaim.take_back(name, 28_999)
-    assert {true, name} = NameClaim.take_back(name, 29_000)
-    assert Directory.members({:robot, id}) == [self()]
-    refute NameClaim.left?(name)
-    assert {false, ^name} = NameClaim.take_back(name, 99_000)
+    assert {false, name} = NameClaim.take_back(name, true, 19_000)
+    assert {false, name} = NameClaim.take_back(name, false, 28_999)
+    assert {true, %{left?: false} = name} = NameClaim.take_back(name, false, 29_000)
+    assert {false, ^name} = NameClaim.take_back(name, false, 99_000)
     # And the same again.
-    assert {true, _name} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
+    assert {:give_way, _name} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
   end
 
   @tag long: true, realtime: :long
@@ -280,9 +273,9 @@ defmodule Swarm.CommsTest do
     for event <- [:duplicate_id, :unique_id], do: :ok = listen(id, [:swarm, :comms, event])
     :ok = Comms.rival(id, {0, :twin@far})
     assert_receive {[:swarm, :comms, :duplicate_id], %{robot: ^id}}
-    assert Directory.members({:robot, id}) == []
+    until(id, fn _ -> Directory.members({:robot, id}) == [] end)
     assert_receive {[:swarm, :comms, :unique_id], %{robot: ^id}}, 15_000
-    assert Directory.members({:robot, id}) == [comms]
+    until(id, fn _ -> Directory.members({:robot, id}) == [comms] end)
     until(id, fn _ -> match?({:ok, _}, Swarm.ask(id, :ping)) end)
     assert Swarm.ask(id, {:move, 0.1, 0.0}) == :ok
     rolls_of(id)
@@ -309,13 +302,14 @@ defmodule Swarm.CommsTest do
   @doc false
   def carry(test, from, ids, message), do: send(test, {:carried, from, ids, message})
 
-  test "say returns the addressees" do
-    ids = for id <- [:comms12, :comms13, :comms14], do: talking(id)
-    message = Message.new(:comms12, :claim, :start)
-    all = Comms.say(:comms12, :all, message)
-    assert all -- ids == all -- [:comms13, :comms14]
-    assert Comms.say(:comms12, :comms13, message) == [:comms13]
-    assert Comms.say(:comms12, [:comms12, :comms14], message) == [:comms14]
+  test "what it says is for one robot, for several, or for all others, and never for itself" do
+    id = talking(:comms12, comms: [transport: {__MODULE__, :carry, [self()]}])
+    message = Message.new(id, :claim, :start)
+
+    for {to, ids} <- [all: :all, comms13: [:comms13]] ++ [{[id, :comms14], [:comms14]}] do
+      assert Comms.say(id, to, message) == :ok
+      assert_receive {:carried, ^id, ^ids, ^message}
+    end
   end
 
   test "a stop pressed on a robot's own gate spreads, and a newcomer is not stopped by a cleared one" do

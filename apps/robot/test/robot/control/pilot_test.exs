@@ -82,12 +82,9 @@ defmodule Robot.Control.PilotTest do
   test "carries out every kind of effect" do
     ptz = {Hal.FakePtz, test: self(), device: :ptz}
 
-    id =
-      flown(:pilot3,
-        send: {__MODULE__, :say, [self()]},
-        ptz: ptz
-      )
-
+    id = flown(:pilot3, ptz: ptz)
+    # Its comms hands on what it says.
+    :ok = Names.register(id, :comms, nil)
     listen(id, [:robot, :stage])
     listen(id, [:robot, :pilot, :phase])
 
@@ -99,7 +96,7 @@ defmodule Robot.Control.PilotTest do
     ]
 
     assert Pilot.command(id, {:do, :lead, effects}) == :ok
-    assert_received {:said, :all, %{epoch: 1}}
+    assert_received {:"$gen_cast", {:say, :all, %{epoch: 1}}}
     assert_received {[:robot, :stage], %{robot: ^id, stage: :elected, epoch: 1}}
     assert_received {[:robot, :pilot, :phase], %{state: {Acts.Mission, :lead}}}
     {:ok, %{claim: %{slot: 2}}, _} = Board.fetch(Board.find!(id), :mission, 1_000)
@@ -109,9 +106,6 @@ defmodule Robot.Control.PilotTest do
     assert Pilot.command(id, {:do, :lead, [{:goal, :none, nil}, {:look, -0.5}]}) == :ok
     assert_receive {:ptz, {:look, -0.5, _}, _}
   end
-
-  @doc false
-  def say(test, to, message), do: send(test, {:said, to, message})
 
   test "of the ticks that wait only the newest is handled" do
     id = flown(:pilot4)

@@ -5,7 +5,8 @@ defmodule Sim.Trial.Mechanics do
   alias Hal.Twist
   alias Sim.{Radio, World}
   alias Sim.Trial.{Cuts, Evaluation, Faults, Memory, RunLog}
-  alias Swarm.{Member, Message}
+  alias Swarm.Member
+  alias Swarm.Message.Checked
   alias Vision.Detections
 
   @half_ms 50
@@ -131,7 +132,7 @@ defmodule Sim.Trial.Mechanics do
   def effect({:send, to, message}, id, trial) do
     to = if to == :all, do: List.delete(trial.options.robots, id), else: List.wrap(to)
     # Checked once, and not by each that hears it.
-    letter = {message, Message.check(message)}
+    letter = {message, Checked.mark(message)}
     %{trial | radio: Radio.send(trial.radio, trial.at_ms, id, to, letter)}
   end
 

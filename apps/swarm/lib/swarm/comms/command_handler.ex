@@ -1,9 +1,9 @@
 defmodule Swarm.Comms.CommandHandler do
   @moduledoc """
-  Handles the commands of people (`Swarm`). It runs in the robot's comms process, which people on
-  any node find in the directory, and waits for nobody: it answers from the board, refuses what is
+  Handles the commands of people (`Swarm`) for the robot's comms (`Swarm.Comms`), which people on
+  any node find in the directory: it answers from the board, refuses what is
   not possible with an error of one line, and passes the rest, with the address for the answer, to
-  the process that carries it out. That process answers: the drive's device; or the pilot, if it
+  the part that carries it out. That part answers: the drive's device; or the pilot, if it
   refuses, and the executive, when it has received the order. `Swarm.EStop` handles stops and the
   reset.
 
@@ -25,7 +25,7 @@ defmodule Swarm.Comms.CommandHandler do
   """
   alias Hal.{Device, Pose}
   alias Robot.{Board, Names}
-  alias Robot.Control.{Delivery, Pilot}
+  alias Robot.Control.Delivery
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
   alias Robot.Navigation.{Grid, Reach}
@@ -44,18 +44,29 @@ defmodule Swarm.Comms.CommandHandler do
   @drive_ms 50
 
   @doc """
-  Handles a request that was made at `asked` (`System.monotonic_time/1`, microseconds). The
+  The effects (`t:Robot.Role.effect/0`) of a request that was made at `asked_us` and is handled at `now_us`
+  (`System.monotonic_time/1`, microseconds), which is `at_ms` by the robot's clock. The
   process behind `ref` gets the outcome (`Mesh.Nonblocking.answer/2`).
   """
-  @spec take(term(), {reference(), asked :: integer()}, Robot.Config.t(), Board.t(), Receiver.t()) ::
-          :ok
-  def take(request, {ref, asked}, config, board, receiver) do
-    config = Replacement.config(config, board)
+  @spec take(
+          term(),
+          {reference(), asked_us :: integer(), now_us :: integer()},
+          %{:config => Robot.Config.t(), :receiver => Receiver.t(), optional(atom()) => term()},
+          at_ms :: integer(),
+          Board.t()
+        ) :: [Robot.Role.effect()]
+  def take(request, {ref, asked_us, now_us}, %{receiver: receiver} = comms, at_ms, board) do
+    config = Replacement.config(comms.config, board)
 
     case judge(request, config, board, receiver) do
-      {:drive, order} -> drive(order, config.id, ref, asked)
-      {:mission, ways, command} -> deliver(ways, command, config, ref, asked)
-      answer -> Nonblocking.answer(ref, answer)
+      {:drive, order} ->
+        drive(order, config.id, ref, {asked_us, now_us})
+
+      {:mission, ways, command} ->
+        deliver(ways, command, config.id, ref, {asked_us, now_us, at_ms})
+
+      answer ->
+        [{:apply, {Nonblocking, :answer, [ref, answer]}}]
     end
   end
 
@@ -89,28 +100,29 @@ defmodule Swarm.Comms.CommandHandler do
          do: {:mission, ways, command(request)}
   end
 
-  # A drive that hangs does not answer, so this process has to; of two answers only the first
+  # A drive that hangs does not answer, so comms has to; of two answers only the first
   # arrives.
-  defp drive(order, id, ref, asked) do
-    until_ms = div(asked, 1_000) + @carry_out_ms
-    Device.order_later(Names.via(id, :drive), order, until_ms, {__MODULE__, :ordered, [id, ref]})
-    unanswered = {:error, "#{id}: the drive does not answer"}
-    Process.send_after(self(), {:unanswered, ref, unanswered}, until_ms + @drive_ms, abs: true)
-    :ok
+  defp drive(order, id, ref, {asked_us, now_us}) do
+    until_ms = div(asked_us, 1_000) + @carry_out_ms
+    reply = {__MODULE__, :ordered, [id, ref]}
+    unanswered = {:unanswered, ref, {:error, "#{id}: the drive does not answer"}}
+
+    [
+      {:apply, {Device, :order_later, [Names.via(id, :drive), order, until_ms, reply]}},
+      {:after, max(until_ms + @drive_ms - div(now_us, 1_000), 1), unanswered}
+    ]
   end
 
-  # By the robot's clock, which need not be the one of `asked`.
-  defp deliver(ways, command, %{id: id} = config, ref, asked) do
-    age_ms = div(System.monotonic_time(:microsecond) - asked, 1_000)
-    until_ms = Robot.Config.now(config) + @carry_out_ms - age_ms
-    reply = {__MODULE__, :delivered, [id, command, ref]}
-
-    Pilot.deliver(id, command, %Delivery{
+  # By the robot's clock, which need not be the one of `asked_us`.
+  defp deliver(ways, command, id, ref, {asked_us, now_us, at_ms}) do
+    delivery = %Delivery{
       ways: ways,
-      asked: asked,
-      until_ms: until_ms,
-      reply: reply
-    })
+      asked: asked_us,
+      until_ms: at_ms + @carry_out_ms - div(now_us - asked_us, 1_000),
+      reply: {__MODULE__, :delivered, [id, command, ref]}
+    }
+
+    [{:cast, :pilot, {:deliver, delivery, {:command, command}}}]
   end
 
   @doc """

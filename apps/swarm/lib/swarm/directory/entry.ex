@@ -1,7 +1,8 @@
 defmodule Swarm.Directory.Entry do
   @moduledoc """
   Keeps a role of a robot in the directory, for a role carries nothing out by itself: a companion (`Robot.Companion`) that
-  is listed after it. Its options: `role:`, which is in the group `{role, robot}`, and `all:`, the group of all robots'.
+  is listed after it. Its options: `role:`; `as:`, by default the same, for the group `{as, robot}` that it is in while the
+  robot has its name; and `all:`, a group in which it stays anyway, if any.
   """
   use GenServer
   alias Robot.Names
@@ -13,13 +14,16 @@ defmodule Swarm.Directory.Entry do
   @impl Robot.Companion
   def child_spec({config, options}) do
     role = Keyword.fetch!(options, :role)
-    %{id: {__MODULE__, role}, start: {__MODULE__, :start_link, [config.id, role, options[:all]]}}
+    group = {Keyword.get(options, :as, role), config.id}
+    arguments = [config.id, role, group, List.wrap(options[:all])]
+    %{id: {__MODULE__, role}, start: {__MODULE__, :start_link, arguments}}
   end
 
   @doc "Starts the process, as the robot's supervisor does."
-  @spec start_link(robot :: atom(), role :: atom(), Directory.group()) :: GenServer.on_start()
-  def start_link(robot, role, all) do
-    GenServer.start_link(__MODULE__, {robot, role, all},
+  @spec start_link(robot :: atom(), role :: atom(), Directory.group(), [Directory.group()]) ::
+          GenServer.on_start()
+  def start_link(robot, role, group, all) do
+    GenServer.start_link(__MODULE__, {robot, role, group, all},
       name: Names.via(robot, {:directory, role})
     )
   end
@@ -30,18 +34,18 @@ defmodule Swarm.Directory.Entry do
     do: GenServer.cast(Names.via(robot, {:directory, role}), {:present, present?})
 
   @impl GenServer
-  def init({robot, role, all}) do
+  def init({robot, role, group, all}) do
     case Names.whereis(robot, role) do
       # It has ended meanwhile; with the next one this starts again.
       nil -> :ignore
-      pid -> {:ok, entered(pid, {role, robot}, all)}
+      pid -> {:ok, entered(pid, group, all)}
     end
   end
 
   # Those of an entry that ended alone are still there.
   defp entered(pid, group, all) do
-    Directory.leave(pid, [all, group])
-    entry = %{pid: pid, group: group, all: Membership.enter([all], pid)}
+    Directory.leave(pid, [group | all])
+    entry = %{pid: pid, group: group, all: Membership.enter(all, pid)}
     Map.put(entry, :name, Membership.enter([group], pid))
   end
 

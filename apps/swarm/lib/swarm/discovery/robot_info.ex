@@ -52,42 +52,36 @@ defmodule Swarm.Discovery.RobotInfo do
           age_ms: non_neg_integer() | nil
         }
 
+  @typedoc "What of a board is written at once when it changes."
+  @type seen :: term()
   @typedoc "What was last written, and in how many ticks it is written again."
-  @type noted :: nil | {non_neg_integer(), term()}
+  @type noted :: nil | {non_neg_integer(), seen()}
 
-  @doc """
-  Writes a robot's rows `:about` and `:status` if it is time or something changed; called at each
-  tick of its comms process. Waits for nothing.
-  """
-  @spec note(noted(), Robot.Config.t(), Board.t(), boot :: non_neg_integer(), Receiver.t()) ::
-          noted()
-  def note(noted, config, board, boot, receiver) do
+  @doc "What of a robot's board is written at once when it changes."
+  @spec seen(Board.t()) :: seen()
+  def seen(board) do
     health = Board.health(board, :drive)
     hung = for part <- LivenessMonitor.parts(), do: Board.fetch(board, {:hung, part}, :infinity)
     arming = Board.fetch(board, :arming, :infinity)
-    doing = {doing(board), Board.latched?(board), arming, health, hung}
-
-    case noted do
-      {left, ^doing} when left > 0 ->
-        {left - 1, doing}
-
-      _due ->
-        status = Status.Row.encode(Status.of(config, board, receiver))
-        Blackboard.note(config.id, boot, about: row(config, board), status: status)
-        {@every - 1, doing}
-    end
+    {doing(board), Board.latched?(board), arming, health, hung}
   end
 
   @doc """
-  Ends the writing of a robot that has given way to another of its name; it then receives that
-  one's rows.
-  """
-  @spec leave(noted(), atom()) :: nil
-  def leave(nil, _robot), do: nil
+  Whether a robot's rows are written now, because it is time or something changed; called at each tick of its comms.
 
-  def leave(_noted, robot) do
-    Blackboard.leave(robot)
-    nil
+      iex> {true, noted} = Swarm.Discovery.RobotInfo.due(nil, :seen)
+      iex> {Swarm.Discovery.RobotInfo.due(noted, :seen), Swarm.Discovery.RobotInfo.due(noted, :other)}
+      {{false, {8, :seen}}, {true, {9, :other}}}
+  """
+  @spec due(noted(), seen()) :: {due? :: boolean(), noted()}
+  def due({left, seen}, seen) when left > 0, do: {false, {left - 1, seen}}
+  def due(_noted, seen), do: {true, {@every - 1, seen}}
+
+  @doc "Writes a robot's rows `:about` and `:status`, from the process of its comms. Waits for nothing."
+  @spec write(Robot.Config.t(), Board.t(), Receiver.t()) :: :ok
+  def write(config, board, receiver) do
+    status = Status.Row.encode(Status.of(config, board, receiver))
+    Blackboard.note(config.id, config.boot, about: row(config, board), status: status)
   end
 
   defp doing(board) do

@@ -1,6 +1,6 @@
 defmodule Swarm.Message.Checked do
   @moduledoc """
-  Checks a message once a node instead of once a robot: whoever sends or delivers it to several robots of this node marks
+  Checks a message once a node instead of once a robot: what sends or delivers it to several robots of this node marks
   it as checked, with a reference that only this node knows. What comes without that mark is checked by each robot.
   """
   alias Swarm.Message
@@ -12,12 +12,16 @@ defmodule Swarm.Message.Checked do
   @doc "A message with the mark, or as it is if it does not pass `Swarm.Message.check/1`."
   @spec mark(Message.t()) :: term()
   def mark(message) do
-    with mark when mark != nil <- reference(),
-         {:ok, message} <- Message.check(message) do
-      {mark, message}
-    else
-      _nobody_trusts_it -> message
+    case Message.check(message) do
+      {:ok, message} -> {reference() || begun(), message}
+      {:error, _kind} -> message
     end
+  end
+
+  # In a trial no application has made it.
+  defp begun do
+    :ok = begin()
+    reference()
   end
 
   @doc """

@@ -124,7 +124,7 @@ defmodule Swarm.Order.FreshnessTest do
 
     assert Comms.rival(id, {999, :twin@far}) == :ok
     assert_receive {[:swarm, :comms, :duplicate_id], %{other: :twin@far}}
-    assert Directory.members({:robot, id}) == []
+    eventually(fn -> Directory.members({:robot, id}) == [] end)
     eventually(fn -> Directory.members({:estop, id}) == [] end)
     assert {:ok, %{state: :idle}, _} = Board.fetch(Board.find!(id), :mission, :infinity)
     Swarm.estop()
