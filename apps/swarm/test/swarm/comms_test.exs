@@ -193,7 +193,8 @@ defmodule Swarm.CommsTest do
     assert Swarm.ask(:comms5, :estop) == :ok
     for id <- ids, do: until(id, &Board.latched?/1)
     kill(:comms6, :comms)
-    until(:comms6, fn _ -> Names.whereis(:comms6, :comms) != nil end)
+    found = fn -> {Names.whereis(:comms6, :comms), Directory.members({:robot, :comms6})} end
+    until(:comms6, fn _ -> match?({comms, [comms]} when comms != nil, found.()) end)
     assert Board.latched?(Board.find!(:comms6))
 
     # They are reset one by one, and stay released although the others still report the stop.

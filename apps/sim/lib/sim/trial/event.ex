@@ -14,7 +14,7 @@ defmodule Sim.Trial.Event do
   | `{:join}` | all that the script has cut is whole again |
   | `{:loss, share}` | this share of the messages is lost from now on |
   | `{:freeze, robot, for_s}` | its processes get no processor: it hears, senses, thinks and sends nothing, its wheels stop 200 ms later |
-  | `{:crash, robot, role}` | this part of its program crashes: `:gate`, `:executive`, `:pilot` or `:estop`; it and those behind it begin anew, idle |
+  | `{:crash, robot, role}` | this part of its program crashes: `:gate`, `:executive`, `:pilot`, `:estop` or `:comms`; it and those behind it begin anew, the mission idle if it is among them |
   | `{:hang, robot, role, for_s}` | this part, `:executive` or `:pilot`, handles nothing; after 2 s it is killed, as by a crash |
   | `{:displace, robot, {x, y, heading_deg}}` | it is lifted to another place; its wheels do not count that |
   | `{:blind, robot, for_s}` | its camera gives no pictures |
@@ -89,7 +89,7 @@ defmodule Sim.Trial.Event do
       {:join, [], []},
       {:loss, [share: {:number, 0, 1}], []},
       {:freeze, [robot: who, for_s: for_s], []},
-      {:crash, [robot: who, role: {:one_of, [:gate, :executive, :pilot, :estop]}], []},
+      {:crash, [robot: who, role: {:one_of, [:gate, :executive, :pilot, :estop, :comms]}], []},
       {:hang, [robot: who, role: {:one_of, [:executive, :pilot]}, for_s: for_s], []},
       {:displace, [robot: who, pose: pose], []},
       {:blind, [robot: who, for_s: for_s], []},
