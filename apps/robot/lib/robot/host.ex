@@ -1,13 +1,13 @@
 defmodule Robot.Host do
   @moduledoc """
   Runs a role of a robot (`Robot.Role`) as a process: hands it what arrives, carries out its effects, and records both
-  (`Robot.Trace`). A role that has phases (`c:Robot.Role.phase/1`) is run by `Robot.Host.Phases`, the others by a `GenServer`.
+  (`Robot.Trace`). It is a `GenServer`; a role that has phases is run by `Robot.Host.Phases`.
   """
   use GenServer
   alias Hal.{Device, Event, Ticker}
   alias Robot.{Board, Names, Role, Trace}
   alias Robot.Control.Crash
-  alias Robot.Host.{LoadShedder, Phases}
+  alias Robot.Host.LoadShedder
 
   @slow_us 50_000
   @dropped_every_ms 60_000
@@ -21,14 +21,16 @@ defmodule Robot.Host do
 
   @doc "Starts the process of a role. The robot's board must be running."
   @spec start_link({module(), Robot.Config.t()}) :: GenServer.on_start()
-  def start_link({role, %Robot.Config{id: id}} = arg) do
-    spawned = [priority: role.priority(), message_queue_data: :off_heap]
-    name = Names.via(id, role.name())
+  def start_link({role, %Robot.Config{id: id}} = arg),
+    do:
+      GenServer.start_link(__MODULE__, arg,
+        name: Names.via(id, role.name()),
+        spawn_opt: spawned(role)
+      )
 
-    if Code.ensure_loaded?(role) and function_exported?(role, :phase, 1),
-      do: :gen_statem.start_link(name, Phases, arg, spawn_opt: spawned),
-      else: GenServer.start_link(__MODULE__, arg, name: name, spawn_opt: spawned)
-  end
+  @doc "The options of a role's process, for `:erlang.spawn_opt/2`."
+  @spec spawned(module()) :: keyword()
+  def spawned(role), do: [priority: role.priority(), message_queue_data: :off_heap]
 
   @impl GenServer
   def init(arg), do: {:ok, begin(arg)}

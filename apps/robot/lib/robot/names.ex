@@ -32,7 +32,15 @@ defmodule Robot.Names do
 
   @doc "The process in this role and the value that it registered with, or `nil`."
   @spec lookup(robot :: atom(), role :: term()) :: {pid(), value :: term()} | nil
-  def lookup(robot, role), do: List.first(Registry.lookup(__MODULE__, {robot, role}))
+  # A registry lists a process that has ended for a moment.
+  def lookup(robot, role) do
+    with [{pid, _value} = found] <- Registry.lookup(__MODULE__, {robot, role}),
+         true <- Process.alive?(pid) do
+      found
+    else
+      _none_or_ended -> nil
+    end
+  end
 
   @doc "Registers the calling process in a role, with a value that others can look up."
   @spec register(robot :: atom(), role :: term(), value :: term()) ::

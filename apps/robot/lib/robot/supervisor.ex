@@ -46,7 +46,7 @@ defmodule Robot.Supervisor do
       {Host, {Gate, config}},
       {LivenessMonitor, config},
       {Host, {Executive, config}},
-      {Host, {Pilot, config}}
+      {Host.Phases, {Pilot, config}}
     ]
 
     companions = for {module, options} <- config.companions, do: {module, {config, options}}

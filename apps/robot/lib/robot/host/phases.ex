@@ -5,7 +5,19 @@ defmodule Robot.Host.Phases do
   `{{Missions.Landmark, :follow}, data}`.
   """
   @behaviour :gen_statem
-  alias Robot.Host
+  alias Robot.{Host, Names}
+
+  @doc "The process of a role as a child of the robot's supervisor."
+  @spec child_spec({module(), Robot.Config.t()}) :: Supervisor.child_spec()
+  def child_spec({role, %Robot.Config{}} = arg),
+    do: %{id: role, start: {__MODULE__, :start_link, [arg]}}
+
+  @doc "Starts the process of a role. The robot's board must be running."
+  @spec start_link({module(), Robot.Config.t()}) :: :gen_statem.start_ret()
+  def start_link({role, %Robot.Config{id: id}} = arg) do
+    name = Names.via(id, role.name())
+    :gen_statem.start_link(name, __MODULE__, arg, spawn_opt: Host.spawned(role))
+  end
 
   @impl :gen_statem
   def callback_mode, do: :handle_event_function
