@@ -20,9 +20,32 @@ defmodule Console.LiveTest do
     assert {:error, "there is a wall"} = Live.Trial.command(live, {:landmark, {30.0, 2.0}})
     assert {:ok, _} = Live.Trial.command(live, {:tell, [:mag1], "stop"})
     assert {:ok, _} = Live.Trial.command(live, :estop)
-    assert {:error, line} = Live.Trial.command(live, {:tell, :all, "goto:1:2"})
-    assert line =~ "goto:1:2"
+    assert Live.Trial.command(live, {:tell, [:mag1], "goto:1:2"}) == {:error, "mag1: no"}
+    assert {:error, line} = Live.Trial.command(live, {:tell, :all, "arm"})
+    assert line =~ "no wheels to arm"
     assert Live.Trial.result(live).robots == 3
+  end
+
+  test "robots answer in lockstep as they do live" do
+    line = "--robots 2 --plan known --seed 3"
+    {:ok, live} = Live.Trial.start_link(Sim.Trial, Options.trial(Runs.options(line)))
+    assert {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
+    tell = &Live.Trial.command(live, {:tell, &1, &2})
+
+    assert tell.([:mag1], "goto:99:0") ==
+             {:error, "mag1 cannot go to 99.0,0.0: it is outside of the map"}
+
+    assert tell.([:min1], "followtheleader:min1") == {:error, "min1 cannot follow itself"}
+    assert {:error, line} = tell.([:mag1], "findblob:pink")
+    assert line =~ "mag1 does not know the colour \"pink\"; it looks for "
+    assert tell.([:mag1], "rest") == {:ok, "accepted"}
+    assert Live.Trial.command(live, {:formation, {:wedge, 1.2}}) == {:ok, "accepted"}
+
+    assert Live.Trial.command(live, :estop) == {:ok, "accepted"}
+    held = "mag1 is held by the emergency stop; reset it first"
+    assert tell.([:mag1], "rest") == {:error, held}
+    assert Live.Trial.command(live, :reset) == {:ok, "accepted"}
+    assert tell.(:all, "start") == {:ok, "accepted"}
   end
 
   # What a run shows once it has paused by itself, or is ahead.

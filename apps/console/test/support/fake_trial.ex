@@ -76,10 +76,14 @@ defmodule Console.FakeTrial do
   def move(trial, place), do: {:ok, act(trial, {:move, place})}
   def living(trial), do: for(robot <- trial.robots, robot.alive, do: robot.id)
 
-  def command(trial, :all, {:formation, kind, spacing}),
-    do: %{trial | options: %{trial.options | formation: {kind, spacing}}, formed_ms: nil}
+  def ask(trial, :all, {:formation, kind, spacing}) do
+    options = %{trial.options | formation: {kind, spacing}}
+    {%{trial | options: options, formed_ms: nil}, Map.new(living(trial), &{&1, :ok})}
+  end
 
-  def command(trial, _to, _command), do: trial
+  def ask(trial, :all, _command), do: {trial, Map.new(living(trial), &{&1, :ok})}
+  def ask(trial, id, {:goto, _x, _y, _heading}), do: {trial, %{id => {:error, "#{id}: no"}}}
+  def ask(trial, id, _command), do: {trial, %{id => :ok}}
 
   def done?(%{options: options} = trial) do
     trial.at_ms >= options.duration_s * 1000 or

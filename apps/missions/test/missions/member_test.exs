@@ -209,12 +209,12 @@ defmodule Swarm.MemberTest do
 
   test "a stop ends any mission at once, and no older order moves the robot until the next start" do
     options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
-    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    {member, [{:reply, :ok}]} = Member.step(Member.new(options), {:command, :start, 0})
     rolling = member |> sense(100) |> sense(200)
     assert {_, [{:drive, %Twist{linear: v}}]} = Member.step(rolling, {:reflex, 200})
     assert v > 0
 
-    {stopped, []} = Member.step(rolling, {:command, :stop, 200})
+    {stopped, [{:reply, :ok}]} = Member.step(rolling, {:command, :stop, 200})
 
     assert %{phase: :idle, module: nil, mission: nil, claim: claim} =
              stopped.lockstep.roles.pilot.runner
@@ -222,16 +222,18 @@ defmodule Swarm.MemberTest do
     assert claim == %{}
     assert Member.stands?(stopped)
     assert stands?(stopped, 200)
-    {stopped, []} = Member.step(stopped, {:command, {:formation, :wedge, 1.0}, 300})
+    # No mission takes it.
+    shape = {:command, {:formation, :wedge, 1.0}, 300}
+    {stopped, [{:reply, {:error, :no_formation}}]} = Member.step(stopped, shape)
     assert stopped |> sense(300) |> sense(400) |> stands?(400)
 
-    {started, []} = Member.step(stopped, {:command, :start, 500})
+    {started, [{:reply, :ok}]} = Member.step(stopped, {:command, :start, 500})
     refute started |> sense(500) |> sense(600) |> stands?(600)
   end
 
   defp rolling do
     options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
-    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    {member, [{:reply, :ok}]} = Member.step(Member.new(options), {:command, :start, 0})
     member = member |> sense(100) |> sense(200)
     refute stands?(member, 200)
     elem(Member.step(member, {:reflex, 200}), 0)
@@ -246,7 +248,7 @@ defmodule Swarm.MemberTest do
       assert crashed.lockstep.config.boot == 2
       crashed = crashed |> sense(300) |> sense(400)
       assert stands?(crashed, 400)
-      {started, []} = Member.step(crashed, {:command, :start, 500})
+      {started, [{:reply, :ok}]} = Member.step(crashed, {:command, :start, 500})
       refute started |> sense(500) |> sense(600) |> stands?(600)
     end
   end
@@ -294,7 +296,7 @@ defmodule Swarm.MemberTest do
 
   test "a touch stops a member that moves at once, and only one that moves" do
     options = [id: :mag1, profile: Profile.magellan(), start: Pose.new(0, 0), mission: {Deaf, []}]
-    {member, []} = Member.step(Member.new(options), {:command, :start, 0})
+    {member, [{:reply, :ok}]} = Member.step(Member.new(options), {:command, :start, 0})
     member = sense(member, 100)
     touch = {:reading, {:bumpers, [0]}, 220}
     assert {_, []} = Member.step(member, touch)
@@ -391,9 +393,9 @@ defmodule Swarm.MemberTest do
   end
 
   test "what people asked of the group's mission survives a stop" do
-    {member, []} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
-    {stopped, []} = Member.step(member, {:command, :stop, 100})
-    {started, []} = Member.step(stopped, {:command, :start, 200})
+    {member, [{:reply, :ok}]} = Member.step(member(), {:command, {:formation, :wedge, 1.2}, 0})
+    {stopped, [{:reply, :ok}]} = Member.step(member, {:command, :stop, 100})
+    {started, [{:reply, :ok}]} = Member.step(stopped, {:command, :start, 200})
 
     assert %{formation: {:wedge, 1.2}, started?: true} =
              started.lockstep.roles.pilot.runner.mission
@@ -403,6 +405,7 @@ defmodule Swarm.MemberTest do
 
   test "while it is stopped, it accepts no command but stop" do
     {member, _} = Member.step(member(), {:command, :estop, 0})
-    assert {^member, []} = Member.step(member, {:command, :start, 100})
+    held = {:error, "mag1 is held by the emergency stop; reset it first"}
+    assert {^member, [{:reply, ^held}]} = Member.step(member, {:command, :start, 100})
   end
 end

@@ -221,7 +221,16 @@ defmodule Robot.Host do
   defp act({:apply, then}, s, at_ms), do: act({:apply, then, []}, s, at_ms)
   defp act({:apply, nil, _more}, _s, _at_ms), do: :ok
   defp act({:apply, {:cast, _role, _message} = cast, []}, s, at_ms), do: act(cast, s, at_ms)
+
+  defp act({:apply, {:cast, role, message}, [result]}, s, at_ms),
+    do: act({:cast, role, {:result, message, result}}, s, at_ms)
+
   defp act({:apply, {m, f, a}, more}, _s, _at_ms), do: apply(m, f, a ++ more)
+  defp act({:reply, nil, _answer}, _s, _at_ms), do: :ok
+
+  # It may be an alias of a node that is gone, for which nothing waits.
+  defp act({:reply, ref, answer}, _s, _at_ms),
+    do: :erlang.send(ref, {ref, answer}, [:nosuspend, :noconnect])
 
   defp act({:after, ms, message}, _s, _at_ms),
     do: Process.send_after(self(), {:"$gen_cast", message}, ms)

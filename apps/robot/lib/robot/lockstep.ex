@@ -10,8 +10,8 @@ defmodule Robot.Lockstep do
   | a role that ends begins anew with those behind it | `crash/3` |
   | what a role that hangs is told waits; after 2 s it is killed | `hang/4`, `wake/2` |
 
-  What devices, other robots and people notice is returned. What is for a role that is not among them is lost, as are
-  answers, for which nothing waits here.
+  What devices, other robots and people notice is returned. What is for a role that is not among them is lost, as is what
+  comes later by a timer (`:after`).
   """
   alias Hal.Twist
   alias Robot.{Board, Role}
@@ -45,6 +45,7 @@ defmodule Robot.Lockstep do
           | {:look, pan :: float(), tilt :: float()}
           | {:send, to :: atom() | [atom()] | :all, struct()}
           | {:stage, atom(), map()}
+          | {:reply, answer :: term()}
 
   @doc """
   A robot of this config, in the life that its `boot` numbers, with what is on its board. Roles hear each other in an order
@@ -219,6 +220,9 @@ defmodule Robot.Lockstep do
   defp act({:apply, {:cast, to, message}}, role, _robot, _at_ms),
     do: {:tell, {role, to, {:cast, message}}}
 
+  defp act({:apply, {:cast, to, message}, [result]}, role, _robot, _at_ms),
+    do: {:tell, {role, to, {:cast, {:result, message, result}}}}
+
   defp act({:put, key, value}, _role, robot, at_ms) when key in @kept,
     do: {:board, Map.put(robot.board, key, {value, at_ms})}
 
@@ -232,6 +236,7 @@ defmodule Robot.Lockstep do
 
   defp act({:transmit, to, message}, _role, _robot, _at_ms), do: {:out, {:send, to, message}}
   defp act({:stage, _name, _about} = effect, _role, _robot, _at_ms), do: {:out, effect}
+  defp act({:reply, _ref, answer}, _role, _robot, _at_ms), do: {:out, {:reply, answer}}
   defp act(:tick, role, robot, at_ms), do: {:now, hand(role, robot, :tick, at_ms)}
   defp act(_inside, _role, _robot, _at_ms), do: :ok
 end

@@ -20,7 +20,8 @@ defmodule Robot.Role do
   | `{:cast, role, message}` | hands a message to another role |
   | `{:answer, from, result}` | answers `:ask` |
   | `{:answer_saved, from}` | answers `:ask` once the latch is in its file (`Robot.Board.saved/2`) |
-  | `{:apply, then}`, `{:apply, then, more}` | tells a part that waits for this (`t:then/0`) |
+  | `{:apply, then}`, `{:apply, then, more}` | tells a part that waits for this (`t:then/0`); a role gets `{:result, message, result}` |
+  | `{:reply, ref, answer}` | answers a person's order or question with this alias; `nil` where none waits |
   | `{:after, ms, message}` | hands the role this message as a cast, so much later |
   | `{:disarm, then}` | disarms the wheels, and tells a part that waits for this |
   | `{:send, to, message}` | hands the role `:comms` a message to other robots, as `{:cast, :comms, {:say, to, message}}` |
@@ -58,6 +59,7 @@ defmodule Robot.Role do
           | {:answer_saved, GenServer.from() | nil}
           | {:apply, then()}
           | {:apply, then(), more :: [term()]}
+          | {:reply, reference() | nil, answer :: term()}
           | {:after, ms :: pos_integer(), message :: term()}
           | {:disarm, then()}
           | {:send, to :: atom() | [atom()] | :all, struct()}

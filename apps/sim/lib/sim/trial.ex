@@ -25,10 +25,17 @@ defmodule Sim.Trial do
 
   @enforce_keys [:options, :map, :world, :radio, :members, :script, :run_log, :colours]
   defstruct @enforce_keys ++
-              [at_ms: 0, faults: %Faults{}, severed: nil, entries: nil]
+              [at_ms: 0, faults: %Faults{}, severed: nil, entries: nil, answers: %{}]
 
-  @typedoc "`entries` holds what happened since it was last taken, newest first; `nil`: not recorded."
-  @type t :: %__MODULE__{at_ms: non_neg_integer(), entries: [entry()] | nil}
+  @typedoc """
+  `entries` holds what happened since it was last taken, newest first; `nil`: not recorded. `answers` are those of robots to
+  the last order.
+  """
+  @type t :: %__MODULE__{
+          at_ms: non_neg_integer(),
+          entries: [entry()] | nil,
+          answers: %{atom() => term()}
+        }
 
   @typedoc """
   What a recording holds: each input of a robot (`t:Swarm.Member.input/0`) with the effects that
@@ -155,10 +162,15 @@ defmodule Sim.Trial do
 
   @doc "Sends a command to one living robot or to all; a frozen one does not get it."
   @spec command(t(), atom() | :all, term()) :: t()
-  def command(trial, to, command) do
-    Enum.reduce(awake(trial), trial, fn id, trial ->
+  def command(trial, to, command), do: elem(ask(trial, to, command), 0)
+
+  @doc "The same, with the answers of those that answer at once, as `Swarm.Commands.Client.ask/2` gathers them."
+  @spec ask(t(), atom() | :all, term()) :: {t(), %{atom() => term()}}
+  def ask(trial, to, command) do
+    Enum.reduce(awake(trial), %{trial | answers: %{}}, fn id, trial ->
       if to in [:all, id], do: input(trial, id, told(command, trial.at_ms)), else: trial
     end)
+    |> then(&{&1, &1.answers})
   end
 
   # A fault of its program is no command of a person.
@@ -240,11 +252,22 @@ defmodule Sim.Trial do
 
   defp input(trial, id, input), do: input(trial, id, input, &Member.step(&1, input))
 
+  # Answers are for those that ask, and no effects on the run.
+  defp answered(trial, _id, []), do: {trial, []}
+
+  defp answered(trial, id, effects) do
+    case Enum.split_with(effects, &match?({:reply, _answer}, &1)) do
+      {[], effects} -> {trial, effects}
+      {[reply | _], effects} -> {put_in(trial.answers[id], elem(reply, 1)), effects}
+    end
+  end
+
   # `step` is what the input does.
   defp input(trial, id, input, step) do
     case trial.members do
       %{^id => member} ->
         {member, effects} = step.(member)
+        {trial, effects} = answered(trial, id, effects)
 
         trial =
           note(%{trial | members: %{trial.members | id => member}}, fn ->

@@ -95,8 +95,11 @@ defmodule Swarm.Commands do
   one line about those that do not accept, with the answers of the others.
   """
   @spec tell([atom()], term()) :: Swarm.answer() | {:ok, line :: String.t()}
-  def tell(robots, request) do
-    answers = Commands.Client.ask(robots, request)
+  def tell(robots, request), do: told(robots, Commands.Client.ask(robots, request))
+
+  @doc "The same in words, by the answers of the robots."
+  @spec told([atom()], %{atom() => term()}) :: Swarm.answer() | {:ok, line :: String.t()}
+  def told(robots, answers) do
     said = for id <- robots, {:ok, line} <- [answers[id]], do: line
     accepted? = &(&1 == :ok or match?({:ok, _line}, &1))
     refusals = for id <- robots, not accepted?.(answers[id]), do: refusal(id, answers[id])
@@ -114,8 +117,11 @@ defmodule Swarm.Commands do
   is named.
   """
   @spec any([atom()], term()) :: Swarm.answer()
-  def any(robots, request) do
-    answers = Commands.Client.ask(robots, request)
+  def any(robots, request), do: any_told(robots, Commands.Client.ask(robots, request))
+
+  @doc "The same in words, by the answers of the robots."
+  @spec any_told([atom()], %{atom() => term()}) :: Swarm.answer()
+  def any_told(robots, answers) do
     {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
     others = Enum.reject(others, &(answers[&1] == {:error, :no_formation}))
     lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()

@@ -18,6 +18,7 @@ defmodule Swarm.Comms do
   | `{:say, to, message}` | the mission: for a robot, several, or `:all` |
   | `{:command, request, ref, order}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) |
   | `{:stamp, ref}` | a sender on another node that will send an order |
+  | `{:result, {:delivered, command, ref}, outcome}` | pilot or executive, which an order has reached |
   | `{:rival, identity, comms}` | another robot of this name |
   | `:stop` | the e-stop, which has changed |
   | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`) |
@@ -131,7 +132,7 @@ defmodule Swarm.Comms do
   def expendable?(message),
     do: not (is_tuple(message) and tuple_size(message) > 1 and elem(message, 0) in orders())
 
-  defp orders, do: [:command, :say, :rival, :stamp, :unanswered]
+  defp orders, do: [:command, :say, :rival, :stamp, :unanswered, :result]
 
   @impl Role
   def init(%Robot.Config{id: id, boot: boot} = config, board, _at_ms) do
@@ -162,8 +163,11 @@ defmodule Swarm.Comms do
 
   defp whole({:command, request, ref}, now_us), do: whole({:command, request, ref, nil}, now_us)
 
-  defp whole({:command, request, ref, order}, now_us) when is_reference(ref),
-    do: {:command, request, ref, Freshness.arrived(order, node(ref) == node()), now_us}
+  # Without a reference nothing waits for an answer, as in lockstep, and it is not known from which node it comes.
+  defp whole({:command, request, ref, order}, now_us) when ref == nil or is_reference(ref) do
+    here? = ref != nil and node(ref) == node()
+    {:command, request, ref, Freshness.arrived(order, here?), now_us}
+  end
 
   defp whole({:stamp, ref}, now_us) when is_reference(ref), do: {:stamp, ref, now_us}
 
@@ -178,6 +182,11 @@ defmodule Swarm.Comms do
        do: message
 
   defp whole({:unanswered, ref, _answer} = message, _now_us) when is_reference(ref), do: message
+
+  defp whole({:result, {:delivered, _command, ref}, _outcome} = message, _now_us)
+       when ref == nil or is_reference(ref),
+       do: message
+
   defp whole(:stop, _now_us), do: :stop
   defp whole(_unknown, _now_us), do: malformed()
 
@@ -231,16 +240,19 @@ defmodule Swarm.Comms do
         {s, command(request, {ref, asked_us, now_us}, order, s, at_ms, board)}
 
       {:error, why} ->
-        {reject(s, :too_old, 1), [answer(ref, Freshness.refusal(s.config.id, why))]}
+        {reject(s, :too_old, 1), [{:reply, ref, Freshness.refusal(s.config.id, why)}]}
     end
   end
 
   def handle({:cast, {:stamp, ref, now_us}}, _at_ms, s, _board),
-    do: {s, [answer(ref, Freshness.stamp(s.config.boot, now_us))]}
+    do: {s, [{:reply, ref, Freshness.stamp(s.config.boot, now_us)}]}
 
   # The time for the drive's answer is over.
   def handle({:cast, {:unanswered, ref, answer}}, _at_ms, s, _board),
-    do: {s, [answer(ref, answer)]}
+    do: {s, [{:reply, ref, answer}]}
+
+  def handle({:cast, {:result, {:delivered, command, ref}, outcome}}, _at_ms, s, _board),
+    do: {s, [{:reply, ref, CommandHandler.answer(outcome, s.config.id, command)}]}
 
   def handle({:cast, {:rejected, why, count}}, _at_ms, s, _board), do: {reject(s, why, count), []}
 
@@ -363,6 +375,5 @@ defmodule Swarm.Comms do
     end
   end
 
-  defp answer(ref, answer), do: {:apply, {Nonblocking, :answer, [ref, answer]}}
   defp reject(s, why, count), do: %{s | receiver: Receiver.reject(s.receiver, why, count)}
 end

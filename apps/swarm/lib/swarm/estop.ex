@@ -30,7 +30,6 @@ defmodule Swarm.EStop do
   """
   @behaviour Robot.Companion
   @behaviour Robot.Role
-  alias Mesh.Nonblocking
   alias Robot.{Board, Host, Names, Role}
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
@@ -106,7 +105,7 @@ defmodule Swarm.EStop do
   When the robot was last stopped, by any kind of stop (`System.monotonic_time/1`, microseconds);
   `nil` if never.
   """
-  @spec stopped(Board.t()) :: integer() | nil
+  @spec stopped(Board.t() | Board.entries()) :: integer() | nil
   def stopped(board), do: read(board, :stopped)
 
   @doc "The state of the stop that the e-stop process published."
@@ -202,8 +201,9 @@ defmodule Swarm.EStop do
   end
 
   # From the robot's comms process, which has determined when it was given.
-  defp whole({:in_time, request, ref, given_us}) when is_reference(ref) and is_integer(given_us),
-    do: {:command, request, ref, {:asked, given_us}}
+  defp whole({:in_time, request, ref, given_us})
+       when (ref == nil or is_reference(ref)) and is_integer(given_us),
+       do: {:command, request, ref, {:asked, given_us}}
 
   defp whole({:release, about} = message), do: if(about?(about), do: message, else: :unknown)
 
@@ -398,8 +398,7 @@ defmodule Swarm.EStop do
       [{:cast, :gate, {:latch, {Answer, :latched, [s.robot, ref]}}}]
   end
 
-  defp answer(nil, _answer), do: []
-  defp answer(ref, answer), do: [{:apply, {Nonblocking, :answer, [ref]}, [answer]}]
+  defp answer(ref, answer), do: [{:reply, ref, answer}]
 
   defp stopped_again(s), do: {:error, "#{s.robot} was stopped again meanwhile; reset it again"}
 

@@ -7,7 +7,7 @@ defmodule Swarm.Member do
   | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
   | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
-  | `{:command, command, at_ms}` | a person |
+  | `{:command, command, at_ms}` | a person, with the effect `{:reply, answer}` once its outcome is known |
   | `{:tick, at_ms}` | the clock, 10 Hz: executive, then pilot, then comms |
   | `{:reflex, at_ms}` | the clock, 20 Hz: the gate |
   | `{:crash, role, at_ms}` | a fault: this role begins anew, and those behind it, as under their supervisor |
@@ -16,26 +16,11 @@ defmodule Swarm.Member do
   Effects are those of `Robot.Lockstep`.
   """
   alias Robot.{Board, Lockstep, Percept}
-  alias Robot.Control.{Controller, Delivery, Executive, Pilot}
-  alias Robot.Mission.{Manual, Runner}
+  alias Robot.Control.{Controller, Executive, Pilot}
+  alias Robot.Mission.Runner
   alias Robot.Safety.Gate
-  alias Swarm.Comms.CommandHandler
   alias Swarm.{Comms, EStop}
   alias Swarm.Membership.Peers
-
-  # Orders for one robot alone (`Robot.Command`), which leaves the group's mission for them.
-  defguardp is_alone(command)
-            when command in [:lead, :wander, :rest] or
-                   (is_tuple(command) and
-                      elem(command, 0) in [
-                        :goto,
-                        :move,
-                        :follow,
-                        :follow_the_leader,
-                        :find_blob,
-                        :square,
-                        :run
-                      ])
 
   @roles [Gate, Executive, Pilot, EStop, Comms]
 
@@ -59,7 +44,8 @@ defmodule Swarm.Member do
 
   @doc """
   A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
-  `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `plan` (the walls of a floor
+  `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `colours` (what its camera looks
+  for, `Vision.Colours`; `nil` for a robot without), `plan` (the walls of a floor
   plan, `Robot.Navigation.Grid`, or a `Robot.Navigation.OccupancyGrid` for those that its sonars will have seen), `order` (a
   seed from which the order is drawn in which roles hear each other; `nil`: as they tell it).
   """
@@ -68,14 +54,15 @@ defmodule Swarm.Member do
     options =
       Keyword.validate!(
         options,
-        [:id, :profile, :start, :mission, boot: 1, plan: nil, order: nil]
+        [:id, :profile, :start, :mission, boot: 1, colours: nil, plan: nil, order: nil]
       )
 
     {module, mission_options} = options[:mission]
 
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
-    given = Keyword.take(options, [:id, :profile, :start, :plan, :mission, :boot])
-    others = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}, pace: :manual]
+    given = Keyword.take(options, [:id, :profile, :start, :plan, :mission, :boot, :colours])
+    camera = options[:colours] && {__MODULE__, []}
+    others = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}, camera: camera, pace: :manual]
     config = struct!(Robot.Config, given ++ others)
     board = %{arming: {%{state: :armed, why: nil}, 0}}
     lockstep = Lockstep.new(config, @roles, board, options[:order])
@@ -108,19 +95,13 @@ defmodule Swarm.Member do
     do: input(member, :comms, {:cast, {:hear, term}}, at_ms)
 
   def step(member, {:command, command, at_ms}) do
-    with false <- EStop.takes?(command),
-         {:ok, ways} <- ways(command, member) do
-      event = {:command, CommandHandler.command(command)}
-      delivery = %Delivery{ways: ways, until_ms: :infinity, reply: nil}
-      input(member, :pilot, {:cast, {:deliver, delivery, event}}, at_ms)
-    else
-      true ->
-        stamp = {member.lockstep.config.boot, 1_000 * at_ms}
-        input(member, :estop, {:cast, {:command, command, nil, stamp}}, at_ms)
+    order = {member.lockstep.config.boot, 1_000 * at_ms}
+    {member, effects} = input(member, :comms, {:cast, {:command, command, nil, order}}, at_ms)
 
-      {:error, _line} ->
-        {member, []}
-    end
+    # No base reports that it stands.
+    if EStop.takes?(command) and command != :reset and member.lockstep.hung == %{},
+      do: {member, effects ++ [{:reply, :ok}]},
+      else: {member, effects}
   end
 
   def step(member, {:tick, at_ms}) do
@@ -175,14 +156,6 @@ defmodule Swarm.Member do
   def stands?(member) do
     Runner.state(runner(member)) == :idle or role(member, :executive).controller.tag == :stand
   end
-
-  # What people order goes the ways that it goes live; what a mission's own programs order is for the one that runs.
-  defp ways(command, member)
-       when is_alone(command) or command == :start or
-              (is_tuple(command) and elem(command, 0) in [:start, :formation]),
-       do: CommandHandler.ways(command, member.lockstep.config)
-
-  defp ways(_other, _member), do: {:ok, [{:hand, {:except, Manual}}]}
 
   defp input(member, role, input, at_ms),
     do: by(member, Lockstep.input(member.lockstep, role, input, at_ms))

@@ -91,18 +91,18 @@ defmodule Swarm.Replacement do
   defp cast(message), do: {:apply, {GenServer, :cast, [Replacement.Server, message]}}
 
   @doc "The config with the mission that was put in the place of its own, if any."
-  @spec config(Robot.Config.t(), Board.t()) :: Robot.Config.t()
+  @spec config(Robot.Config.t(), Board.t() | Board.entries()) :: Robot.Config.t()
   def config(config, board) do
-    case Board.fetch(board, :replaced, :infinity) do
+    case Board.fetch(board, :replaced, :infinity, 0) do
       {:ok, %{mission: {_module, _options} = mission}, _at_ms} -> %{config | mission: mission}
       _own -> config
     end
   end
 
   @doc "Whether a robot is just being given another mission; then it takes no orders that would move it."
-  @spec changing?(Board.t()) :: boolean()
+  @spec changing?(Board.t() | Board.entries()) :: boolean()
   def changing?(board) do
-    case Board.fetch(board, :replaced, :infinity) do
+    case Board.fetch(board, :replaced, :infinity, 0) do
       {:ok, %{changing?: changing?}, _at_ms} -> changing?
       :error -> false
     end

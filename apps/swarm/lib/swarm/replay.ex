@@ -24,7 +24,7 @@ defmodule Swarm.Replay do
   @spec step(Member.t(), Member.input(), recorded :: [Member.effect()]) ::
           {Member.t(), difference() | nil}
   def step(member, input, recorded) do
-    case Member.step(member, input) do
+    case again(member, input) do
       {member, ^recorded} ->
         {member, nil}
 
@@ -38,6 +38,12 @@ defmodule Swarm.Replay do
            replayed: replayed
          }}
     end
+  end
+
+  # A recording holds no answers to people.
+  defp again(member, input) do
+    {member, effects} = Member.step(member, input)
+    {member, Enum.reject(effects, &match?({:reply, _answer}, &1))}
   end
 
   @typedoc """
@@ -65,7 +71,7 @@ defmodule Swarm.Replay do
 
     {member, effects} =
       Enum.reduce(inputs, {before, []}, fn input, {member, effects} ->
-        {member, more} = Member.step(member, input)
+        {member, more} = again(member, input)
         {member, effects ++ more}
       end)
 

@@ -12,10 +12,14 @@ defmodule Console.Live.Trial do
   alias Console.Live.Pace
   alias Console.Page.About
   alias Console.Prompt
+  alias Robot.Command
   alias Sim.{Recorder, Trial}
   alias Sim.Recording.Pictures
+  alias Swarm.Commands
   alias Swarm.Missions.Text
   @behaviour Console.Live
+
+  @done {:ok, "done"}
 
   @doc "Starts the run of a new trial; the error says in one line what is wrong with its options."
   @spec start_link(module(), map(), Pace.t()) :: {:ok, pid()} | {:error, String.t()}
@@ -118,9 +122,9 @@ defmodule Console.Live.Trial do
     stop? = Prompt.kind(command) == :stop
 
     with true <- stop? or state.stopped_us == nil or given_us >= state.stopped_us,
-         {:ok, trial} <- carry_out(command, state) do
+         {%_struct{} = trial, said} <- carry_out(command, state) do
       stopped_us = if stop?, do: System.monotonic_time(:microsecond), else: state.stopped_us
-      {:reply, {:ok, "done"}, %{state | trial: trial, stopped_us: stopped_us}}
+      {:reply, said, %{state | trial: trial, stopped_us: stopped_us}}
     else
       false ->
         {:reply, {:error, "they were stopped after this command was given; repeat it"}, state}
@@ -164,13 +168,13 @@ defmodule Console.Live.Trial do
   defp carry_out({:kill, :leader}, %{module: module, trial: trial}) do
     case module.scene(trial).leader do
       nil -> {:error, "there is no leader to kill yet"}
-      leader -> {:ok, module.kill(trial, leader)}
+      leader -> {module.kill(trial, leader), @done}
     end
   end
 
   defp carry_out({:kill, robot}, %{module: module, trial: trial}) do
     if robot in module.living(trial),
-      do: {:ok, module.kill(trial, robot)},
+      do: {module.kill(trial, robot), @done},
       else: {:error, "#{robot} is already dead"}
   end
 
@@ -178,15 +182,13 @@ defmodule Console.Live.Trial do
     do: {:error, "in lockstep the landmark can be moved, but not removed"}
 
   defp carry_out({:landmark, place}, %{module: module, trial: trial}),
-    do: module.move(trial, place)
+    do: with({:ok, trial} <- module.move(trial, place), do: {trial, @done})
 
-  defp carry_out({:formation, {kind, spacing}}, %{module: module, trial: trial}) do
+  defp carry_out({:formation, {kind, spacing}}, %{module: module, trial: trial} = state) do
     {_kind, present} = module.scene(trial).formation
-    {:ok, module.command(trial, :all, {:formation, kind, spacing || present})}
+    tell(:all, {:formation, kind, spacing || present}, state, &Commands.any_told/2)
   end
 
-  defp carry_out({:tell, target, "stop"}, state), do: tell(target, :stop, state)
-  defp carry_out({:tell, target, "start"}, state), do: tell(target, :start, state)
   defp carry_out(:reset, state), do: tell(:all, :reset, state)
 
   # One call for all.
@@ -195,17 +197,33 @@ defmodule Console.Live.Trial do
     tell(:all, {:estop, {:demo, 0, at_ms}}, state)
   end
 
-  defp carry_out({:tell, target, "start:" <> text}, %{module: module, trial: trial} = state) do
-    with {:ok, {mission, options}} <- Text.read(text, length(module.living(trial))),
-         do: tell(target, {:start, mission, options}, state)
+  defp carry_out({:tell, target, text}, %{module: module, trial: trial} = state) do
+    robots = module.living(trial)
+
+    with {:ok, command} <- Command.parse(text, robots),
+         :ok <- possible(command),
+         {:ok, request} <- Text.request(command, length(robots)),
+         do: tell(target, request, state)
   end
 
-  defp carry_out({:tell, _target, text}, _state),
-    do: {:error, "in lockstep robots accept stop and start, not #{text}"}
+  defp possible(command) when command in [:ping, :arm, :disarm, :acknowledge],
+    do: {:error, "in lockstep robots have no wheels to arm or disarm, and answer no ping"}
 
-  defp tell(:all, command, %{module: module, trial: trial}),
-    do: {:ok, module.command(trial, :all, command)}
+  defp possible(_command), do: :ok
 
-  defp tell(robots, command, %{module: module, trial: trial}),
-    do: {:ok, Enum.reduce(robots, trial, &module.command(&2, &1, command))}
+  defp tell(target, request, %{module: module, trial: trial}, words \\ &Commands.told/2) do
+    robots = if target == :all, do: module.living(trial), else: target
+
+    {trial, answers} =
+      for to <- if(target == :all, do: [:all], else: target), reduce: {trial, %{}} do
+        {trial, answers} ->
+          {trial, more} = module.ask(trial, to, request)
+          {trial, Map.merge(answers, more)}
+      end
+
+    case words.(robots, answers) do
+      :ok -> {trial, {:ok, "accepted"}}
+      said -> {trial, said}
+    end
+  end
 end

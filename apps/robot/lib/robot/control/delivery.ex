@@ -36,15 +36,15 @@ defmodule Robot.Control.Delivery do
           {:error, :idle | :no_mission | :held | :stopped | :late | (line :: String.t())}
 
   @typedoc """
-  `until_ms` is when the requester stops waiting, by the robot's clock (ms; `:infinity` in lockstep): a later command
+  `until_ms` is when the requester stops waiting, by the robot's clock (ms): a later command
   is refused. `asked` is the time of the request (`System.monotonic_time/1`, microseconds; `nil`
-  if unknown): a request from before a stop is refused. `reply` is applied with `:ok` or a refusal
-  as its last argument; `nil` for nobody that waits.
+  if unknown): a request from before a stop is refused. `reply` gets `:ok` or a refusal
+  (`t:Robot.Role.then/0`); `nil` where none waits.
   """
   @type t :: %__MODULE__{
           ways: [way()],
           asked: integer() | nil,
-          until_ms: integer() | :infinity,
+          until_ms: integer(),
           reply: Robot.Role.then()
         }
 

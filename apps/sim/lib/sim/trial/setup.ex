@@ -86,6 +86,7 @@ defmodule Sim.Trial.Setup do
           profile: robot.profile,
           start: robot.start,
           mission: setup.mission,
+          colours: World.colours(),
           plan: setup.plan,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]

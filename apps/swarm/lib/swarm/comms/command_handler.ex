@@ -3,7 +3,7 @@ defmodule Swarm.Comms.CommandHandler do
   Handles the commands of people (`Swarm`) for the robot's comms (`Swarm.Comms`), which people on
   any node find in the directory: it answers from the board, refuses what is
   not possible with an error of one line, and passes the rest, with the address for the answer, to
-  the part that carries it out. That part answers: the drive's device; or the pilot, if it
+  the part that carries it out. That part tells the outcome: the drive's device; or the pilot, if it
   refuses, and the executive, when it has received the order. `Swarm.EStop` handles stops and the
   reset.
 
@@ -53,49 +53,54 @@ defmodule Swarm.Comms.CommandHandler do
           {reference(), asked_us :: integer(), now_us :: integer()},
           %{:config => Robot.Config.t(), :receiver => Receiver.t(), optional(atom()) => term()},
           at_ms :: integer(),
-          Board.t()
+          Board.t() | Board.entries()
         ) :: [Robot.Role.effect()]
   def take(request, {ref, asked_us, now_us}, %{receiver: receiver} = comms, at_ms, board) do
     config = Replacement.config(comms.config, board)
 
-    case judge(request, config, board, receiver) do
+    case judge(request, config, board, {receiver, at_ms}) do
       {:drive, order} ->
         drive(order, config.id, ref, {asked_us, now_us})
 
       {:mission, ways, command} ->
-        deliver(ways, command, config.id, ref, {asked_us, now_us, at_ms})
+        deliver(ways, command, ref, {asked_us, now_us, at_ms})
 
       answer ->
-        [{:apply, {Nonblocking, :answer, [ref, answer]}}]
+        [{:reply, ref, answer}]
     end
   end
 
-  defp judge(:status, config, board, receiver), do: Status.of(config, board, receiver)
+  # A robot in lockstep has no such words.
+  defp judge(question, %{id: id}, %{} = board, _heard)
+       when question in [:status, :ping, :sonar] and not is_struct(board),
+       do: {:error, "#{id} answers no #{question} in lockstep"}
 
-  defp judge(:ping, config, board, receiver),
+  defp judge(:status, config, board, {receiver, _at_ms}), do: Status.of(config, board, receiver)
+
+  defp judge(:ping, config, board, {receiver, _at_ms}),
     do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
 
-  defp judge(:sonar, config, board, _receiver) do
-    case Board.fetch(board, :sonar, @recent_ms) do
+  defp judge(:sonar, config, board, {_receiver, at_ms}) do
+    case Board.fetch(board, :sonar, @recent_ms, at_ms) do
       {:ok, ranges, _age_ms} -> {:ok, Enum.zip(config.profile.sonars, ranges)}
       _old_or_none -> {:error, "#{config.id}: its sonars say nothing"}
     end
   end
 
-  defp judge(:acknowledge, _config, _board, _receiver), do: {:drive, :acknowledge}
+  defp judge(:acknowledge, _config, _board, _heard), do: {:drive, :acknowledge}
 
   # A command that is accepted while all robots are stopped would begin with the reset.
-  defp judge(request, config, board, receiver) do
-    if Board.latched?(board), do: held(config.id), else: free(request, config, board, receiver)
+  defp judge(request, config, board, heard) do
+    if Board.latched?(board), do: held(config.id), else: free(request, config, board, heard)
   end
 
-  defp free(:arm, _config, _board, _receiver), do: {:drive, :arm}
+  defp free(:arm, _config, _board, _heard), do: {:drive, :arm}
 
-  defp free(request, config, board, receiver) do
+  defp free(request, config, board, heard) do
     with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
-         :ok <- possible(request, config, board, receiver),
+         :ok <- possible(request, config, board, heard),
          {:ok, ways} <- ways(request, config),
          do: {:mission, ways, command(request)}
   end
@@ -114,12 +119,12 @@ defmodule Swarm.Comms.CommandHandler do
   end
 
   # By the robot's clock, which need not be the one of `asked_us`.
-  defp deliver(ways, command, id, ref, {asked_us, now_us, at_ms}) do
+  defp deliver(ways, command, ref, {asked_us, now_us, at_ms}) do
     delivery = %Delivery{
       ways: ways,
       asked: asked_us,
       until_ms: at_ms + @carry_out_ms - div(now_us - asked_us, 1_000),
-      reply: {__MODULE__, :delivered, [id, command, ref]}
+      reply: {:cast, :comms, {:delivered, command, ref}}
     }
 
     [{:cast, :pilot, {:deliver, delivery, {:command, command}}}]
@@ -132,24 +137,19 @@ defmodule Swarm.Comms.CommandHandler do
   def ordered(_id, ref, :ok), do: Nonblocking.answer(ref, :ok)
   def ordered(id, ref, {:error, line}), do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
 
-  @doc """
-  Called by pilot or executive with the outcome of an order for the mission; answers the caller.
-  """
-  @spec delivered(atom(), command :: term(), reference(), :ok | Delivery.refusal()) :: :ok
-  def delivered(id, command, ref, outcome),
-    do: Nonblocking.answer(ref, answer(outcome, id, command))
+  @doc "The answer to a person's order for the mission, by its outcome at pilot or executive."
+  @spec answer(:ok | Delivery.refusal(), robot :: atom(), command :: term()) ::
+          :ok | {:error, :no_formation | (line :: String.t())}
+  def answer(:ok, _id, _command), do: :ok
+  def answer({:error, :held}, id, _command), do: held(id)
+  def answer({:error, :idle}, _id, _formation), do: {:error, :no_formation}
+  def answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
+  def answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}
 
-  defp answer(:ok, _id, _command), do: :ok
-  defp answer({:error, :held}, id, _command), do: held(id)
-  defp answer({:error, :idle}, _id, _formation), do: {:error, :no_formation}
-  defp answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
-
-  defp answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}
-
-  defp answer({:error, :late}, id, _command),
+  def answer({:error, :late}, id, _command),
     do: {:error, "#{id} answers too late; repeat the command"}
 
-  defp answer({:error, :stopped}, id, _command), do: Freshness.refusal(id, :stopped)
+  def answer({:error, :stopped}, id, _command), do: Freshness.refusal(id, :stopped)
 
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 
@@ -180,7 +180,7 @@ defmodule Swarm.Comms.CommandHandler do
   defp well(%{id: id}, board) do
     hangs =
       for part <- [:gate, :pilot],
-          {:ok, {:silent, module}, _at_ms} <- [Board.fetch(board, {:hung, part}, :infinity)],
+          {:ok, {:silent, module}, _at_ms} <- [Board.fetch(board, {:hung, part}, :infinity, 0)],
           do: LivenessMonitor.words(part, module)
 
     cond do
@@ -201,20 +201,20 @@ defmodule Swarm.Comms.CommandHandler do
          {:goto, x, y, _heading},
          %{plan: %Grid{} = plan, profile: profile, id: id},
          board,
-         _receiver
+         _heard
        ) do
     with {:error, why} <- Reach.check(plan, place(board), {x, y}, profile.radius),
          do: {:error, "#{id} cannot go to #{x},#{y}: #{Reach.words(why)}"}
   end
 
-  defp possible({:follow_the_leader, leader}, %{id: id} = config, _board, receiver),
-    do: Order.follow(id, leader, Receiver.leaders(receiver, Robot.Config.now(config)))
+  defp possible({:follow_the_leader, leader}, %{id: id}, _board, {receiver, at_ms}),
+    do: Order.follow(id, leader, Receiver.leaders(receiver, at_ms))
 
-  defp possible({:find_blob, colour}, config, _board, _receiver), do: known(colour, config)
-  defp possible(_request, _config, _board, _receiver), do: :ok
+  defp possible({:find_blob, colour}, config, _board, _heard), do: known(colour, config)
+  defp possible(_request, _config, _board, _heard), do: :ok
 
   defp place(board) do
-    case Board.fetch(board, :pose, :infinity) do
+    case Board.fetch(board, :pose, :infinity, 0) do
       {:ok, %Pose{} = pose, _at_ms} -> Pose.point(pose)
       _unknown -> nil
     end
@@ -235,28 +235,22 @@ defmodule Swarm.Comms.CommandHandler do
   defp list([name]), do: name
   defp list(names), do: Enum.join(names, ", ")
 
-  @doc "The ways of a command to the robot's mission (`Robot.Control.Delivery`), also in lockstep."
-  @spec ways(term(), %{
-          :mission => Robot.Config.module_options() | nil,
-          optional(atom()) => term()
-        }) ::
-          {:ok, [Delivery.way()]} | {:error, line :: String.t()}
-  # What people asked of a mission survives a stop of it.
-  def ways(:start, config), do: ways({:start, []}, config)
+  # The ways of a command to the robot's mission. What people asked of it survives a stop of it.
+  defp ways(:start, config), do: ways({:start, []}, config)
 
-  def ways({:start, []}, config) do
+  defp ways({:start, []}, config) do
     with {:ok, anew} <- begin([], config),
          do: {:ok, [{:hand, {:except, Manual}}, :resume, anew]}
   end
 
-  def ways({:start, options}, config),
+  defp ways({:start, options}, config),
     do: with({:ok, anew} <- begin(options, config), do: {:ok, [anew]})
 
-  def ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
-  def ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
+  defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
+  defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
 
   # A mission may name such a command as one of its own.
-  def ways(alone, _config) do
+  defp ways(alone, _config) do
     own = {:hand, {:naming, Robot.Command.name(alone)}}
     {:ok, [own, {:hand, {:only, Manual}}, {:start, Manual, []}]}
   end
@@ -271,9 +265,8 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp mission(%{mission: mission}), do: {:ok, mission}
 
-  @doc "What the mission gets of a command that took one of its ways."
-  @spec command(term()) :: term()
-  def command({:start, _options}), do: :start
-  def command({:start, _module, _options}), do: :start
-  def command(request), do: request
+  # What the mission gets of a command that took one of its ways.
+  defp command({:start, _options}), do: :start
+  defp command({:start, _module, _options}), do: :start
+  defp command(request), do: request
 end
