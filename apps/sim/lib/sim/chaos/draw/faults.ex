@@ -1,8 +1,8 @@
 defmodule Sim.Chaos.Draw.Faults do
   @moduledoc false
   # Draws the script of a run (`Sim.Trial.Event`): robots that freeze, or see or hear nothing for a while,
-  # a radio that becomes worse for a while, people who press the emergency stop and start again, or ask
-  # for another shape. Pure; times in whole seconds.
+  # parts of their program that crash or hang, a radio that becomes worse for a while, people who press the
+  # emergency stop and start again, or ask for another shape. Pure; times in whole seconds.
   alias Sim.Chaos.Draw.Events
   alias Sim.Chaos.Random
 
@@ -43,15 +43,17 @@ defmodule Sim.Chaos.Draw.Faults do
     {[{at_s, {kind, who, for_s}}], random}
   end
 
+  # A robot that begins anew stands until a person starts it.
   defp script(:crash, at_s, who, _loss, random) do
     {role, random} = Random.pick(random, [:gate, :executive, :pilot, :estop])
-    {[{at_s, {:crash, who, role}}], random}
+    {for_s, random} = Random.whole(random, 1, 5)
+    {[{at_s, {:crash, who, role}}, {at_s + for_s, {:tell, :all, :start}}], random}
   end
 
   defp script(:hang, at_s, who, _loss, random) do
     {role, random} = Random.pick(random, [:executive, :pilot])
     {for_s, random} = Random.number(random, 0.2, 3.0, 1)
-    {[{at_s, {:hang, who, role, for_s}}], random}
+    {[{at_s, {:hang, who, role, for_s}}, {at_s + ceil(for_s) + 1, {:tell, :all, :start}}], random}
   end
 
   defp script(:loss, at_s, _who, loss, random) do
