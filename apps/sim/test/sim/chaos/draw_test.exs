@@ -46,6 +46,19 @@ defmodule Sim.Chaos.DrawTest do
     Enum.each(draws(1..100), &valid!/1)
   end
 
+  test "who crashes or hangs is started again within 5 s" do
+    broken =
+      for run <- draws(1..100),
+          {at_s, event} <- run[:script],
+          elem(event, 0) in [:crash, :hang] do
+        starts = for {start_s, {:tell, :all, :start}} <- run[:script], do: start_s - at_s
+        assert Enum.any?(starts, &(&1 > Sim.Trial.Event.lasts_s(event) and &1 <= 5))
+        elem(event, 2)
+      end
+
+    assert broken |> Enum.uniq() |> Enum.sort() == [:estop, :executive, :gate, :pilot]
+  end
+
   @tag :long
   @tag timeout: :infinity
   test "so are two thousand, and all kinds of everything occur" do
