@@ -1,13 +1,13 @@
 [
   about:
-    "Requirement 11.8: a command of 99 m/s drives the robot at the speed of its body, and no faster; a stop ends it.",
+    "Requirement 11.8: a command of 9 m/s drives the robot at the speed of its body, and no faster; a stop ends it.",
   robots: 1,
   landmark: :none,
   noise: :off,
   duration_s: 20,
   script: [
     {0, {:displace, :mag1, {-6, 0, 0}}},
-    {1, {:tell, :mag1, "move:99:0"}},
+    {1, {:tell, :mag1, "move:9:0"}},
     {5, {:tell, :mag1, :stop}}
   ],
   expect: [

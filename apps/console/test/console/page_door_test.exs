@@ -93,7 +93,7 @@ defmodule Console.PageDoorTest do
     defp stands(browser) do
       Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
       Browser.run(browser, "document.getElementById('estop').click()")
-      said = "return document.getElementById('answer').textContent === 'estop: done'"
+      said = "return document.getElementById('answer').textContent === 'estop: accepted'"
       Browser.await(browser, said)
     end
 

@@ -42,7 +42,7 @@ defmodule Console.PageProxyTest do
   defp live(browser) do
     Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
     Browser.run(browser, "document.getElementById('estop').click()")
-    said = "return document.getElementById('answer').textContent === 'estop: done'"
+    said = "return document.getElementById('answer').textContent === 'estop: accepted'"
     Browser.await(browser, said)
   end
 

@@ -335,7 +335,7 @@ defmodule Console.PageTest do
 
       Browser.await(
         browser,
-        "return document.getElementById('answer').textContent === 'estop: done'"
+        "return document.getElementById('answer').textContent === 'estop: accepted'"
       )
 
       Browser.await(
