@@ -183,6 +183,9 @@ defmodule Robot.Lockstep do
   defp arrived(_module, input, _robot, _at_ms), do: input
 
   # Carries out the effects of a role: what it tells others, and what is noticed outside.
+  defp carry({state, []}, role, robot, _at_ms),
+    do: {%{robot | roles: Map.put(robot.roles, role, state)}, [], []}
+
   defp carry({state, effects}, role, robot, at_ms) do
     robot = %{robot | roles: Map.put(robot.roles, role, state)}
 

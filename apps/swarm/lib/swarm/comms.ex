@@ -207,7 +207,7 @@ defmodule Swarm.Comms do
 
   def handle({:tick, seen}, at_ms, s, board) do
     gone = Peers.gone(s.receiver.peers, at_ms)
-    shown = for id <- gone, id not in s.gone, do: show(s, id, at_ms, board)
+    shown = Enum.flat_map(gone -- s.gone, &show(s, &1, at_ms, board))
     s = %{s | gone: gone, ticks: s.ticks + 1}
     {s, noted} = note(s, seen, board)
 
@@ -275,16 +275,19 @@ defmodule Swarm.Comms do
     shown = show(s, id, at_ms, board)
 
     if tags != [] and EStop.news?(EStop.written(board), tags),
-      do: [{:cast, :estop, {:beat, tags}}, shown],
-      else: [shown]
+      do: [{:cast, :estop, {:beat, tags}} | shown],
+      else: shown
   end
 
   defp heard({:message, message}, _s, _at_ms, _board), do: [{:cast, :pilot, {:message, message}}]
   defp heard(:nothing, _s, _at_ms, _board), do: []
 
   # A hundred robots send each other fifty thousand heartbeats a second, so only the row of this one is written.
-  defp show(s, id, at_ms, board),
-    do: {:apply, {__MODULE__, :show_peer, [board, s.receiver.peers, id, at_ms]}}
+  defp show(s, id, at_ms, %Board{} = board),
+    do: [{:apply, {__MODULE__, :show_peer, [board, s.receiver.peers, id, at_ms]}}]
+
+  # In lockstep percepts take them from here.
+  defp show(_s, _id, _at_ms, _entries), do: []
 
   @doc false
   def show_peer(board, peers, id, at_ms) do
