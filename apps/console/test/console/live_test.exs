@@ -38,7 +38,9 @@ defmodule Console.LiveTest do
     assert tell.([:min1], "followtheleader:min1") == {:error, "min1 cannot follow itself"}
     assert {:error, line} = tell.([:mag1], "findblob:pink")
     assert line =~ "mag1 does not know the colour \"pink\"; it looks for "
-    assert tell.([:mag1], "rest") == {:ok, "accepted"}
+    assert {:error, "in lockstep no mission is replaced" <> _} = tell.([:mag1], "replace:flock")
+    assert tell.([:mag1], "square:2") == {:ok, "accepted"}
+    assert %{state: :manual} = Enum.find(Live.Trial.scene(live).robots, &(&1.id == :mag1))
     assert Live.Trial.command(live, {:formation, {:wedge, 1.2}}) == {:ok, "accepted"}
 
     assert Live.Trial.command(live, :estop) == {:ok, "accepted"}

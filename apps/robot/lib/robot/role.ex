@@ -8,6 +8,7 @@ defmodule Robot.Role do
   | `{:cast, message}` | what another part tells it |
   | `{:ask, from, message}` | the same, and somebody waits for `{:answer, from, result}`; `from` is `nil` in a recording |
   | `:tick` | its time has come (`c:period_ms/0`); with `c:perceive/3`, `{:tick, what that sees}` |
+  | `{:info, message}` | whatever else reaches its process, which no role knows |
 
   | effect | what a host does |
   |---|---|
@@ -42,6 +43,7 @@ defmodule Robot.Role do
           | {:ask, from :: GenServer.from() | nil, term()}
           | :tick
           | {:tick, seen :: Robot.Percept.t() | map()}
+          | {:info, term()}
   @type state :: struct()
 
   @typedoc "What waits for a role: `{m, f, a}`, a role with its message, nothing, or what a recording has in place of these."

@@ -29,7 +29,6 @@ defmodule Swarm.Comms do
       robots or `:all`, and arrives by `hear/2`. Default: `Swarm.Transport.transmit/3`
     * `:boot` - a number that grows with every start; by default the time of day
   """
-  alias Mesh.Nonblocking
   alias Robot.{Board, Host, Names, Role}
   alias Robot.Mission.{Claim, Letter}
   alias Swarm.{Blackboard, Directory, EStop, Message, Replacement, Transport, Wire}
@@ -139,7 +138,7 @@ defmodule Swarm.Comms do
     s = %__MODULE__{
       config: config,
       receiver: Receiver.new(id),
-      name: NameClaim.new({boot, node()}),
+      name: NameClaim.new(id, {boot, node()}),
       held: EStop.written(board).held
     }
 
@@ -183,9 +182,9 @@ defmodule Swarm.Comms do
 
   defp whole({:unanswered, ref, _answer} = message, _now_us) when is_reference(ref), do: message
 
-  defp whole({:result, {:delivered, _command, ref}, _outcome} = message, _now_us)
+  defp whole({:result, {:delivered, _command, ref}, outcome} = message, _now_us)
        when ref == nil or is_reference(ref),
-       do: message
+       do: if(CommandHandler.outcome?(outcome), do: message, else: malformed())
 
   defp whole(:stop, _now_us), do: :stop
   defp whole(_unknown, _now_us), do: malformed()
@@ -256,17 +255,9 @@ defmodule Swarm.Comms do
 
   def handle({:cast, {:rejected, why, count}}, _at_ms, s, _board), do: {reject(s, why, count), []}
 
-  def handle({:cast, {:rival, {_boot, node} = other, comms}}, at_ms, s, _board) do
-    case NameClaim.rival(s.name, other, comms, at_ms) do
-      {:give_way, name} ->
-        {%{s | name: name}, give_way(s.config.id, node)}
-
-      {:tell, name} ->
-        {%{s | name: name}, [{:apply, {__MODULE__, :tell_rival, [comms, name.me]}}]}
-
-      {:stay, name} ->
-        {%{s | name: name}, []}
-    end
+  def handle({:cast, {:rival, other, comms}}, at_ms, s, _board) do
+    {name, effects} = NameClaim.rival(s.name, other, comms, at_ms)
+    {%{s | name: name}, effects}
   end
 
   def handle(_unknown, _at_ms, _s, _board), do: :unknown
@@ -332,42 +323,13 @@ defmodule Swarm.Comms do
     end
   end
 
-  defp rivals(s, _seen, _at_ms) when rem(s.ticks, @rivals_every) != 0, do: {s, []}
-
-  defp rivals(%{name: %{left?: false}} = s, _seen, _at_ms),
-    do: {s, [{:apply, {__MODULE__, :challenge, [s.config.id, s.name.me]}}]}
-
-  # It stands until it gets an order.
-  defp rivals(%{config: %{id: id}} = s, %{taken?: taken?}, at_ms) do
-    case NameClaim.take_back(s.name, taken?, at_ms) do
-      {true, name} -> {%{s | name: name}, present(id, true) ++ [{:event, event(:unique_id), %{}}]}
-      {false, name} -> {%{s | name: name}, []}
-    end
+  defp rivals(%{ticks: ticks} = s, %{taken?: taken?}, at_ms)
+       when rem(ticks, @rivals_every) == 0 do
+    {name, effects} = NameClaim.look(s.name, taken?, at_ms)
+    {%{s | name: name}, effects}
   end
 
-  defp give_way(id, other) do
-    present(id, false) ++
-      [{:cast, :pilot, {:halt, nil}}, {:event, event(:duplicate_id), %{other: other}}]
-  end
-
-  defp event(name), do: [:swarm, :comms, name]
-
-  defp present(id, present?) do
-    [
-      {:apply, {Directory.Entry, :present, [id, :comms, present?]}},
-      {:apply, {EStop, :present, [id, present?]}}
-    ]
-  end
-
-  @doc false
-  # Tells all others of the same name the identity of this robot.
-  def challenge(id, me) do
-    for comms <- Directory.members({:robot, id}), comms != self(), do: tell_rival(comms, me)
-    :ok
-  end
-
-  @doc false
-  def tell_rival(comms, me), do: Nonblocking.cast(comms, {:rival, me, self()})
+  defp rivals(s, _seen, _at_ms), do: {s, []}
 
   # A sender that knows only this process reaches the e-stop through it.
   defp command(request, {ref, asked_us, _now_us} = given, order, s, at_ms, board) do

@@ -9,8 +9,8 @@ defmodule Swarm.EStop do
   this process sets. Who stops the gate directly (`Robot.Safety.Gate.estop/1`; of ours `mix calibrate` alone) sets
   and clears it, too; the gate reports that by `:latch`, and this process follows.
 
-  Nobody else decides, and nobody waits for this process: the comms process passes on what a
-  heartbeat says if that differs from the board (`heard/3`), and is told of each change, so that
+  No other part decides, and none waits for this one: comms passes on what a
+  heartbeat says if that differs from the board (`news?/2`), and is told of each change, so that
   the next heartbeats, which follow at once, spread it.
 
   A stop goes to gate, executive and pilot at once, so that one that hangs does not delay the
@@ -35,7 +35,6 @@ defmodule Swarm.EStop do
   alias Robot.Safety.Gate
   alias Swarm.Directory
   alias Swarm.EStop.{Answer, Broadcaster, Calls, State}
-  alias Swarm.Membership.Heartbeat
   alias Swarm.Order.Freshness
   alias Swarm.Wire.StopTags
 
@@ -85,18 +84,6 @@ defmodule Swarm.EStop do
 
   def hear(_node, _malformed), do: :ok
 
-  @doc """
-  Handles a heartbeat that the robot with this board heard. It goes to the e-stop process if it
-  would change the state of the stop; otherwise it is dropped in the caller.
-  """
-  @spec heard(robot :: atom(), Board.t(), Heartbeat.t()) :: :ok
-  def heard(_robot, _board, %Heartbeat{estop: []}), do: :ok
-
-  def heard(robot, board, %Heartbeat{estop: tags}) do
-    if news?(written(board), tags), do: GenServer.cast(Names.via(robot, :estop), {:beat, tags})
-    :ok
-  end
-
   @doc "Whether the tags of a neighbour's heartbeat would change the state of the stop."
   @spec news?(State.t(), [State.tag()]) :: boolean()
   def news?(stop, tags), do: tags != [] and State.hear(stop, tags) != stop
@@ -122,14 +109,6 @@ defmodule Swarm.EStop do
   @spec takes?(request :: term()) :: boolean()
   def takes?({:estop, _call}), do: true
   def takes?(request), do: request in [:stop, :disarm, :estop, :reset]
-
-  @doc """
-  Passes a request to the e-stop process from the robot's comms process, which has determined when
-  it was given (`Swarm.Order.Freshness`).
-  """
-  @spec take(robot :: atom(), request :: term(), {reference(), given_us :: integer()}) :: :ok
-  def take(robot, request, {ref, given_us}),
-    do: GenServer.cast(Names.via(robot, :estop), {:in_time, request, ref, given_us})
 
   @doc "The process that keeps the e-stop process of a robot in the directory, as a companion after it."
   @spec entry() :: Robot.Config.module_options()
@@ -200,7 +179,7 @@ defmodule Swarm.EStop do
     {:command, request, ref, Freshness.arrived(order, here?)}
   end
 
-  # From the robot's comms process, which has determined when it was given.
+  # From the robot's comms, which has determined when it was given.
   defp whole({:in_time, request, ref, given_us})
        when (ref == nil or is_reference(ref)) and is_integer(given_us),
        do: {:command, request, ref, {:asked, given_us}}

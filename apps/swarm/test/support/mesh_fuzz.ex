@@ -21,7 +21,7 @@ defmodule Swarm.MeshNodes.Fuzz do
   @known @unknown ++
            ~w(speak hear put enter hint note back repeat pass_on quiet again estop command in_time stamp present rejected
               rival say beat release unlatched latch unsaved take keep stood started runs forget info counts sign
-              unanswered push status tick udp udp_passive udp_error)a
+              unanswered result push status tick udp udp_passive udp_error)a
 
   # The longest mailbox that a gate or an e-stop process, which go before all others, may have.
   @short 500
@@ -126,6 +126,7 @@ defmodule Swarm.MeshNodes.Fuzz do
       %{__struct__: Swarm.Message},
       %{__struct__: :nothing},
       make_ref(),
+      {:delivered, :start, make_ref()},
       self(),
       node(),
       fn -> raise "called" end

@@ -152,12 +152,18 @@ defmodule Swarm.CommsTest do
           do: send(comms, {tag, junk})
 
       send(comms, {:"$gen_call", {self(), make_ref()}, junk})
-      for word <- [:say, :command, :rival, :hear], do: GenServer.cast(comms, {word, junk})
+
+      for word <- [:say, :command, :rival, :hear, :result],
+          do: GenServer.cast(comms, {word, junk})
+
       for word <- [:say, :command, :rival], do: GenServer.cast(comms, {word, junk, junk})
       GenServer.cast(comms, {:say, [:mag1], junk})
       GenServer.cast(comms, {:rival, {junk, node()}, self()})
       GenServer.cast(comms, {:command, junk, self()})
       GenServer.cast(comms, {:command, junk, ref})
+
+      for outcome <- [junk, {:error, junk}, {:error, :unheard_of}],
+          do: GenServer.cast(comms, {:result, {:delivered, :start, ref}, outcome})
 
       for word <- [:start, :goto, :move, :follow_the_leader, :find_blob, :position, :subscribe],
           do: GenServer.cast(comms, {:command, {word, junk}, ref})
@@ -250,22 +256,25 @@ defmodule Swarm.CommsTest do
   end
 
   test "a name is taken back when the other robot has not been heard for ten seconds" do
-    name = NameClaim.new({1_000, node()})
+    name = NameClaim.new(:comms20, {1_000, node()})
     # One heartbeat from another node in its name, with the lowest number of a life.
-    assert {:give_way, %{left?: true} = name} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
-    assert {false, name} = NameClaim.take_back(name, false, 9_999)
+    assert {%{left?: true} = name, [_, _ | told]} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
+    duplicate = {:event, [:swarm, :comms, :duplicate_id], %{other: :twin@far}}
+    assert told == [{:cast, :pilot, {:halt, nil}}, duplicate]
+    assert {^name, []} = NameClaim.look(name, false, 9_999)
     # Later lives, and itself, do not count; as long as the first is heard, it stays away.
-    assert {:stay, name} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)
-    assert {:stay, name} = NameClaim.rival(name, {0, :twin@far}, nil, 9_000)
-    assert {false, name} = NameClaim.take_back(name, false, 18_999)
+    assert {^name, []} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)
+    assert {name, []} = NameClaim.rival(name, {0, :twin@far}, nil, 9_000)
+    assert {^name, []} = NameClaim.look(name, false, 18_999)
 
     # One that is known by the directory alone is there, too.
-    assert {false, name} = NameClaim.take_back(name, true, 19_000)
-    assert {false, name} = NameClaim.take_back(name, false, 28_999)
-    assert {true, %{left?: false} = name} = NameClaim.take_back(name, false, 29_000)
-    assert {false, ^name} = NameClaim.take_back(name, false, 99_000)
+    assert {name, []} = NameClaim.look(name, true, 19_000)
+    assert {^name, []} = NameClaim.look(name, false, 28_999)
+    assert {%{left?: false} = name, [_, _, unique]} = NameClaim.look(name, false, 29_000)
+    assert unique == {:event, [:swarm, :comms, :unique_id], %{}}
+    assert {^name, [_challenge]} = NameClaim.look(name, false, 99_000)
     # And the same again.
-    assert {:give_way, _name} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
+    assert {%{left?: true}, [_ | _]} = NameClaim.rival(name, {0, :twin@far}, nil, 100_000)
   end
 
   @tag long: true, realtime: :long

@@ -101,7 +101,7 @@ defmodule Swarm.MessageTest do
           do: Map.put(message, Enum.random([:from, :kind, :body]), junk()),
           else: message
 
-      {heard, receiver} = Receiver.hear(Receiver.new(:mag2), message, 0)
+      {heard, receiver} = Receiver.take(Receiver.new(:mag2), Message.check(message), 0)
 
       case heard do
         {:heartbeat, id, _beat} ->

@@ -197,6 +197,9 @@ defmodule Console.Live.Trial do
     tell(:all, {:estop, {:demo, 0, at_ms}}, state)
   end
 
+  defp carry_out({:tell, _target, "replace" <> _mission}, _state),
+    do: {:error, "in lockstep no mission is replaced; start:MISSION starts another one"}
+
   defp carry_out({:tell, target, text}, %{module: module, trial: trial} = state) do
     robots = module.living(trial)
 

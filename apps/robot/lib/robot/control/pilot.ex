@@ -13,9 +13,9 @@ defmodule Robot.Control.Pilot do
   The mission's callbacks may be foreign code. While one runs, the board has an entry `:asking` (`c:Robot.Role.foreign/2`),
   so that `Robot.Safety.LivenessMonitor` detects one that does not return, and kills the pilot.
 
-  Wheels that are disarmed end the mission, whoever disarms them and whoever arms them again
-  (`arm: :manual` or `:auto`), which a stage `:disarmed` tells people, and while they may not turn none starts (`Robot.Safety.Readiness`).
-  So arming starts no motion.
+  Wheels that are disarmed end the mission, whatever disarms them and whatever arms them again
+  (`arm: :manual` or `:auto`); a stage `:disarmed` tells people. While they may not turn, none starts
+  (`Robot.Safety.Readiness`). So arming starts no motion.
 
   A role (`Robot.Role`): the functions above the callbacks are for those that reach its process.
   """

@@ -27,6 +27,8 @@ defmodule Robot.Mission.Manual do
   @silent_ms 1_000
   # A robot that gives up goes so much farther than it must (metres) for a place where it is less in the way.
   @aside 1.0
+  # The phases in which no command is carried out.
+  @over [:ready, :done, :given_up, :found, :not_found]
   # It has not surely arrived at a place if it may be this far from there (metres).
   @unsure 0.5
 
@@ -40,6 +42,19 @@ defmodule Robot.Mission.Manual do
           result: integer() | nil,
           why: String.t() | nil
         }
+
+  @doc """
+  A robot's claim as people are shown it: its heartbeats say `:idle` while it carries out a command, which is `:manual` here.
+
+      iex> alias Robot.Mission.Manual
+      iex> for phase <- [:goto, :done], do: Manual.shown({Manual, phase}, %{phase: :idle})
+      [%{phase: :manual}, %{phase: :idle}]
+  """
+  @spec shown(:idle | {module(), atom()}, claim :: map()) :: map()
+  def shown({__MODULE__, phase}, claim) when phase not in @over,
+    do: Map.put(claim, :phase, :manual)
+
+  def shown(_state, claim), do: claim
 
   @impl Robot.Mission
   def init(robot, _options),

@@ -1,7 +1,7 @@
 defmodule Robot.Mission.Runner do
   @moduledoc """
   Runs the life cycle of a robot's mission as a function: start, events, halt by a stop, resume. Pure if the mission is;
-  `Robot.Control.Pilot` runs it in a process, `Swarm.Member` in lockstep.
+  a part of `Robot.Control.Pilot`.
 
   Events for an idle robot are dropped. The caller carries out the effects, in their order, except
   `{:claim, map}`: the mission's claim is kept here until the mission is halted.

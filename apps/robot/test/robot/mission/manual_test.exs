@@ -1,5 +1,6 @@
 defmodule Robot.Mission.ManualTest do
   use ExUnit.Case, async: true
+  doctest Robot.Mission.Manual
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Behaviour.{Follow, Goto, Stop}
   alias Robot.{Command, Percept}

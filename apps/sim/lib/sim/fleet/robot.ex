@@ -10,9 +10,6 @@ defmodule Sim.Fleet.Robot do
   @armed_ms 5_000
   @look_ms 10
 
-  # The timeout of a command to a single robot.
-  @over [:ready, :done, :given_up, :found, :not_found]
-
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
   kind of blobs, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
@@ -95,10 +92,7 @@ defmodule Sim.Fleet.Robot do
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
       claim = if Board.latched?(board), do: Map.put(claim, :estop, callers(board)), else: claim
 
-      case state do
-        {Manual, phase} when phase not in @over -> Map.put(claim, :phase, :manual)
-        _group_or_idle -> claim
-      end
+      Manual.shown(state, claim)
     else
       # Between the crash of a board and the next one.
       :error -> %{}

@@ -3,6 +3,7 @@ defmodule Sim.Trial.Mechanics do
   # Describes what moves the world of a run, senses it, and judges the fleet in it; the same for a run
   # (`Sim.Trial`) and for its replay (`Sim.Replay`). Pure.
   alias Hal.Twist
+  alias Robot.Mission.{Manual, Runner}
   alias Sim.{Radio, World}
   alias Sim.Trial.{Cuts, Evaluation, Faults, Memory, RunLog}
   alias Swarm.Member
@@ -36,7 +37,8 @@ defmodule Sim.Trial.Mechanics do
   def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
 
   defp claim(member) do
-    claim = Map.put_new(Member.claim(member), :uncertainty, Member.uncertainty(member))
+    claim = Manual.shown(Runner.state(Member.runner(member)), Member.claim(member))
+    claim = Map.put_new(claim, :uncertainty, Member.uncertainty(member))
     if callers = Member.held(member), do: Map.put(claim, :estop, callers), else: claim
   end
 

@@ -137,6 +137,13 @@ defmodule Swarm.Comms.CommandHandler do
   def ordered(_id, ref, :ok), do: Nonblocking.answer(ref, :ok)
   def ordered(id, ref, {:error, line}), do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
 
+  @doc "Whether a term is the outcome of an order at pilot or executive, which has an answer."
+  @spec outcome?(term()) :: boolean()
+  def outcome?({:error, why}),
+    do: is_binary(why) or why in [:held, :idle, :no_mission, :late, :stopped]
+
+  def outcome?(other), do: other == :ok
+
   @doc "The answer to a person's order for the mission, by its outcome at pilot or executive."
   @spec answer(:ok | Delivery.refusal(), robot :: atom(), command :: term()) ::
           :ok | {:error, :no_formation | (line :: String.t())}

@@ -1,11 +1,10 @@
 defmodule Swarm.Message.Receiver do
   @moduledoc """
   Handles the messages that a robot receives, as a function: tracks which robots are present, and
-  counts what was dropped. Pure; `Swarm.Comms` uses it live and `Swarm.Member` in lockstep.
+  counts what was dropped. Pure; a part of `Swarm.Comms`.
   """
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message
-  alias Swarm.Message.Checked
 
   @enforce_keys [:me, :peers]
   defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
@@ -30,19 +29,11 @@ defmodule Swarm.Message.Receiver do
   def new(me), do: %__MODULE__{me: me, peers: Peers.new(me)}
 
   @doc """
-  Hears a term from outside, whatever it is; a message that was checked on this node is not checked again.
+  Hears what was checked (`Swarm.Message.check/1`), on this node: once for all robots that hear it.
 
-      iex> {heard, receiver} = Swarm.Message.Receiver.hear(Swarm.Message.Receiver.new(:mag1), "junk", 0)
+      iex> {heard, receiver} = Swarm.Message.Receiver.take(Swarm.Message.Receiver.new(:mag1), {:error, :not_a_message}, 0)
       iex> {heard, receiver.rejected}
       {:nothing, %{not_a_message: 1}}
-  """
-  @spec hear(t(), term(), integer()) :: {heard(), t()}
-  def hear(%__MODULE__{} = receiver, term, now_ms),
-    do: take(receiver, Checked.open(term), now_ms)
-
-  @doc """
-  The same for what was checked before (`Swarm.Message.check/1`), on this node and not by whoever sent it: once for all
-  robots that hear it.
   """
   @spec take(t(), {:ok, Message.t()} | {:error, atom()}, integer()) :: {heard(), t()}
   def take(%__MODULE__{me: me} = receiver, checked, now_ms) do
