@@ -24,10 +24,9 @@ defmodule Console.Live do
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
   @typedoc """
-  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed; those
-  that are not in lockstep take orders to single robots.
+  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed.
   """
-  @type offer :: :kill | :landmark | :arm | :orders
+  @type offer :: :kill | :landmark | :arm
 
   @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
   @callback pace(live :: term()) :: String.t() | nil

@@ -159,7 +159,7 @@ defmodule Console.Prompt do
 
   @doc "The help, one command a line; of what only some fleets can do, what this one offers."
   @spec help([Console.Live.offer()]) :: [String.t()]
-  def help(offers \\ [:kill, :landmark, :orders]) do
+  def help(offers \\ [:kill, :landmark]) do
     when_offered = fn offer, lines -> if offer in offers, do: lines, else: [] end
 
     when_offered.(:kill, ["kill leader, kill mag2        that robot dies"]) ++
@@ -170,13 +170,11 @@ defmodule Console.Prompt do
       when_offered.(:landmark, [
         "landmark 3,2, landmark none   the landmark glides there, or is removed"
       ]) ++
-      when_offered.(:orders, [
+      [
         "goto mag2 1,2                 one robot drives to a place",
         "follow min1 mag2              one robot follows another",
         "drive mag2                    drives it by the keys of this terminal",
-        "gamepad mag2, gamepad off     drives it by #{@gamepad}, or by another path"
-      ]) ++
-      [
+        "gamepad mag2, gamepad off     drives it by #{@gamepad}, or by another path",
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
         "start patrol:period=90        starts another mission:",

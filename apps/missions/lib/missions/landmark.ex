@@ -26,7 +26,6 @@ defmodule Missions.Landmark do
   alias Robot.Localiser.Anchors
   alias Swarm.{Formation, Message}
   alias Swarm.Agreement.Round
-  alias Swarm.Comms.Forwarder
   alias Swarm.Formation.Trail
   alias Missions.Landmark
   alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Lookout, Policy}
@@ -144,10 +143,8 @@ defmodule Missions.Landmark do
         do: effects,
         else: effects ++ [anchors: unled(mission)]
 
-    # What is passed on are others' own words, not what this robot makes of them.
-    {mission, beats} = relay_beats(mission, percept)
     {mission, refused} = EpochFilter.tell(mission)
-    effects = letters ++ beats ++ stages ++ refused ++ effects
+    effects = letters ++ stages ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, SelfReport.claim(mission)}]}
   end
 
@@ -168,10 +165,8 @@ defmodule Missions.Landmark do
 
   defp unled(_mission), do: %Anchors{walls?: false}
 
-  defp hear({:ok, %Message{kind: :round, from: from, body: letter} = message}, mission) do
-    {mission, relays} = relay_letter(mission, message)
-    {mission.phase, Rounds.hear(mission, from, letter), relays}
-  end
+  defp hear({:ok, %Message{kind: :round, from: from, body: letter}}, mission),
+    do: still(Rounds.hear(mission, from, letter))
 
   defp hear({:ok, %Message{kind: :claim, body: claim}}, mission) do
     case Landmark.Claim.of(%{claim: claim}) do
@@ -185,27 +180,6 @@ defmodule Missions.Landmark do
   @impl Robot.Mission
   # The formation, and the numbers of the group's last round and epoch.
   def halted(mission), do: %{Entry.enter(mission, :idle) | started?: false}
-
-  # Only robots that take part in the mission handle this.
-  defp relay_beats(%{phase: :idle} = mission, _percept), do: {mission, []}
-
-  defp relay_beats(mission, percept) do
-    {forwarder, beats} =
-      Forwarder.beats(mission.forwarder, mission.me, percept.peers, mission.now_ms)
-
-    {%{mission | forwarder: forwarder}, beats}
-  end
-
-  defp relay_letter(%{percept: percept, phase: phase} = mission, _message)
-       when percept == nil or phase == :idle,
-       do: {mission, []}
-
-  defp relay_letter(%{percept: percept} = mission, message) do
-    {forwarder, letters} =
-      Forwarder.letter(mission.forwarder, mission.me, percept.peers, message, mission.now_ms)
-
-    {%{mission | forwarder: forwarder}, letters}
-  end
 
   defp searched(mission, 1), do: %{mission | scan: :found}
 

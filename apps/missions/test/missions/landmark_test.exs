@@ -157,12 +157,12 @@ defmodule Missions.LandmarkTest do
     for restarted <- @three do
       group = three() |> led(@three) |> Group.run(3)
       other = hd(@three -- [restarted])
-      %{^restarted => %{beat: old}} = group.robots[other].peers.rows
+      %{^restarted => %{beat: old}} = group.robots[other].receiver.peers.rows
       late = Message.new(restarted, :heartbeat, %{old | sequence: old.sequence + 1})
 
       group = group |> Group.kill(restarted) |> Group.join(restarted, {3, 3}, 0.01, boot: 2)
       group = group |> led(@three, 30) |> assert_lawful()
-      boot = fn group -> group.robots[other].peers.rows[restarted].beat.boot end
+      boot = fn group -> group.robots[other].receiver.peers.rows[restarted].beat.boot end
       assert boot.(group) == 2
       assert boot.(Group.hear(group, other, restarted, late)) == 2
     end

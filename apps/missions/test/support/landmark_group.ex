@@ -10,6 +10,7 @@ defmodule Missions.Landmark.Group do
   alias Robot.Mission.Claim
   alias Swarm.{EStop, Message}
   alias Swarm.Membership.{Heartbeat, Peers}
+  alias Swarm.Message.Receiver
   alias Missions.Landmark
 
   @tick_ms 100
@@ -49,7 +50,7 @@ defmodule Missions.Landmark.Group do
     robot = %{
       id: id,
       mission: mission,
-      peers: Peers.new(id),
+      receiver: Receiver.new(id),
       pose: Pose.new(x, y),
       share: share,
       boot: boot,
@@ -188,7 +189,7 @@ defmodule Missions.Landmark.Group do
         slip: 0.0
       },
       odometry: %Odometry{pose: robot.pose, twist: Twist.zero()},
-      peers: Peers.percepts(robot.peers, group.now),
+      peers: Peers.percepts(robot.receiver.peers, group.now),
       detections: detections(group, robot)
     }
   end
@@ -251,6 +252,7 @@ defmodule Missions.Landmark.Group do
 
   defp awake(id, group) do
     group = group |> finish(id) |> event(id, {:tick, percept(group, id)})
+    group = forward(group, id, Receiver.forward(group.robots[id].receiver, group.now))
     if rem(group.now, @beat_ms) == 0, do: beat(group, id), else: group
   end
 
@@ -280,7 +282,7 @@ defmodule Missions.Landmark.Group do
   defp beat(group, id) do
     robot = group.robots[id]
     sender = {robot.boot, robot.sequence + 1}
-    heard = Peers.heard(robot.peers, group.now)
+    heard = Peers.heard(robot.receiver.peers, group.now)
     # As `Swarm.Comms.OwnHeartbeat` does.
     claim = Claim.timely(Landmark, robot.claim, group.now - robot.mission.now_ms)
     beat = Heartbeat.new(sender, percept(group, id), {Landmark, claim}, heard, EStop.State.new())
@@ -379,21 +381,23 @@ defmodule Missions.Landmark.Group do
   @doc "Lets a robot hear a message now."
   @spec hear(t(), atom(), atom(), Message.t()) :: t()
   def hear(group, to, from, message) do
-    {:ok, ^message} = Message.check(message)
+    {:ok, ^message} = checked = Message.check(message)
     ^from = message.from
-    take(group, to, message)
+    {heard, receiver} = Receiver.take(group.robots[to].receiver, checked, group.now)
+    take(put_in(group.robots[to].receiver, receiver), to, heard)
   end
 
-  defp take(group, to, %{kind: :relay, body: message}), do: take(group, to, message)
-  defp take(group, to, %{from: to}), do: group
-
-  defp take(group, to, %{kind: :heartbeat} = message) do
-    direct? = message.hops == 0
-    %{from: from, body: beat} = message
-    update_in(group.robots[to].peers, &Peers.hear(&1, from, beat, group.now, direct?))
+  defp take(group, to, {:message, message}) do
+    forwarded = Receiver.forward(group.robots[to].receiver, message, group.now)
+    group |> forward(to, forwarded) |> event(to, {:message, message})
   end
 
-  defp take(group, to, message), do: event(group, to, {:message, message})
+  defp take(group, _to, _heartbeat_or_nothing), do: group
+
+  defp forward(group, id, {receiver, sendings}) do
+    group = put_in(group.robots[id].receiver, receiver)
+    Enum.reduce(sendings, group, &carry_out(&1, id, &2))
+  end
 
   # How long two robots lead in one connected group.
   defp watch(group) do

@@ -6,7 +6,7 @@ defmodule Robot.Lockstep do
   | live, by `Robot.Host` and OTP | here |
   |---|---|
   | each role has a mailbox | what they tell each other is handed on in the order sent, or in one that is drawn: never two messages of one role to another the other way round |
-  | the board is a table | a map of what is read of it |
+  | the board is a table | a map |
   | a role that ends begins anew with those behind it | `crash/3` |
   | what a role that hangs is told waits; after 2 s it is killed | `hang/4`, `wake/2` |
 
@@ -18,9 +18,6 @@ defmodule Robot.Lockstep do
 
   # When `Robot.Safety.LivenessMonitor` kills what hangs.
   @killed_ms 2_000
-  # What of the board others read, and what roles read of their own when they begin anew.
-  @kept [:frame, :presses, :pose, :mission, :estop, :stopped, :followed]
-
   @enforce_keys [:config, :modules, :roles, :board]
   defstruct @enforce_keys ++ [hung: %{}, random: nil]
 
@@ -226,8 +223,10 @@ defmodule Robot.Lockstep do
   defp act({:apply, {:cast, to, message}, [result]}, role, _robot, _at_ms),
     do: {:tell, {role, to, {:cast, {:result, message, result}}}}
 
-  defp act({:put, key, value}, _role, robot, at_ms) when key in @kept,
+  defp act({:put, key, value}, _role, robot, at_ms),
     do: {:board, Map.put(robot.board, key, {value, at_ms})}
+
+  defp act({:delete, key}, _role, robot, _at_ms), do: {:board, Map.delete(robot.board, key)}
 
   defp act({:latch, set?}, _role, robot, at_ms),
     do: {:board, Map.put(robot.board, :latch, {set?, at_ms})}

@@ -147,7 +147,7 @@ defmodule Robot.MissionCase do
   defp junk(%{trial: trial, letters: letters}) do
     [id | _] = Trial.living(trial)
     member = Trial.robot(trial, id)
-    foreign = %Letter{mission: __MODULE__, version: 1, kind: :junk, fields: [junk: 1]}
+    foreign = %Letter{to: :all, mission: __MODULE__, version: 1, kind: :junk, fields: [junk: 1]}
     others = [foreign | for(letter <- letters, do: %{letter | version: letter.version + 1})]
 
     changed =

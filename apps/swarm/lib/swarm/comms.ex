@@ -4,7 +4,7 @@ defmodule Swarm.Comms do
 
   In: `Swarm.Message.check/1` checks every message at the door (`arrive/3`); malformed ones are dropped and counted.
   Heartbeats become peers on the robot's board, everything else goes to the pilot. Out: the
-  mission's messages and, five times a second, a heartbeat with the robot's state from the board; when the emergency
+  mission's messages, what is forwarded (`Swarm.Message.Forwarder`) and, five times a second, a heartbeat with the robot's state from the board; when the emergency
   stop changes, one at once and then ten a second for a second, so that the change spreads within 200 ms.
 
   An e-stop spreads with the heartbeats. `Swarm.EStop`, which is started before this role,
@@ -200,8 +200,7 @@ defmodule Swarm.Comms do
   @impl Role
   def handle({:cast, {:heard, checked}}, at_ms, s, board) do
     {heard, receiver} = Receiver.take(s.receiver, checked, at_ms)
-    s = %{s | receiver: receiver}
-    {s, heard(heard, s, at_ms, board)}
+    heard(heard, %{s | receiver: receiver}, at_ms, board)
   end
 
   def handle({:tick, seen}, at_ms, s, board) do
@@ -211,11 +210,12 @@ defmodule Swarm.Comms do
     {s, noted} = note(s, seen, board)
 
     counts = %{sent: s.sent, heard: s.receiver.heard, rejected: s.receiver.rejected}
+    {s, forwarded} = forward(s, Receiver.forward(s.receiver, at_ms))
     s = urged(s, board)
     due? = s.urgent > 0 or Heartbeat.due?(s.beat_ms, at_ms)
     {s, beats} = if due?, do: beat(s, at_ms, board), else: {s, []}
     {s, rivals} = rivals(%{s | urgent: max(s.urgent - 1, 0)}, seen, at_ms)
-    {s, noted ++ shown ++ [{:put, :radio, counts}] ++ beats ++ rivals}
+    {s, noted ++ shown ++ [{:put, :radio, counts}] ++ forwarded ++ beats ++ rivals}
   end
 
   def handle({:cast, {:say, to, message}}, _at_ms, %{config: %{id: id}} = s, _board) do
@@ -266,12 +266,24 @@ defmodule Swarm.Comms do
     shown = show(s, id, at_ms, board)
 
     if tags != [] and EStop.news?(EStop.written(board), tags),
-      do: [{:cast, :estop, {:beat, tags}} | shown],
-      else: shown
+      do: {s, [{:cast, :estop, {:beat, tags}} | shown]},
+      else: {s, shown}
   end
 
-  defp heard({:message, message}, _s, _at_ms, _board), do: [{:cast, :pilot, {:message, message}}]
-  defp heard(:nothing, _s, _at_ms, _board), do: []
+  defp heard({:message, message}, s, at_ms, _board) do
+    {s, forwarded} = forward(s, Receiver.forward(s.receiver, message, at_ms))
+    {s, [{:cast, :pilot, {:message, message}} | forwarded]}
+  end
+
+  defp heard(:nothing, s, _at_ms, _board), do: {s, []}
+
+  defp forward(s, {receiver, sendings}) do
+    for {:send, to, message} <- sendings, reduce: {%{s | receiver: receiver}, []} do
+      {s, effects} ->
+        {s, more} = speak(s, to, message)
+        {s, effects ++ more}
+    end
+  end
 
   # A hundred robots send each other fifty thousand heartbeats a second, so only the row of this one is written.
   defp show(s, id, at_ms, %Board{} = board),

@@ -13,7 +13,7 @@ defmodule Swarm.Message do
   | `:round` | one `Swarm.Agreement.Round` letter |
   | `:claim` | `Robot.Mission.Claim`, as in heartbeats, for some robots only: it travels faster than those, or farther |
   | `:mission` | `Robot.Mission.Letter`, a message of a mission's own; the mission's table checks what it says |
-  | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`Swarm.Comms.Forwarder`) |
+  | `:relay` | a whole heartbeat or letter of another robot, for one that does not hear it (`.Forwarder`) |
 
   `hops` counts the robots that have passed a message on, at most three.
   """
@@ -124,7 +124,7 @@ defmodule Swarm.Message do
 
   # Nothing else is passed on, and nothing is wrapped twice.
   defp body(:relay, %__MODULE__{kind: kind, hops: hops} = inner, view)
-       when kind in [:heartbeat, :round] and hops != 0,
+       when kind in [:heartbeat, :round, :mission] and hops != 0,
        do: with({:error, _reason} <- check(inner, view), do: false)
 
   defp body(:relay, _other, _view), do: false

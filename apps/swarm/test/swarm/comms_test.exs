@@ -3,6 +3,7 @@ defmodule Swarm.CommsTest do
   @moduletag :realtime
   @moduletag :capture_log
   alias Hal.{Odometry, Pose}
+  alias Robot.Mission.Letter
   alias Swarm.{Comms, Directory, Message}
   alias Swarm.Comms.NameClaim
   alias Swarm.Membership.Heartbeat
@@ -102,6 +103,27 @@ defmodule Swarm.CommsTest do
     until(:comms2, &is_map_key(Board.peers(&1), :comms1))
     stop_supervised!(:comms2)
     until(:comms1, &match?(%{comms2: %{mode: :dead}}, Board.peers(&1)))
+  end
+
+  # Two robots do not hear each other; the test hears all.
+  def apart(test, from, to, message) do
+    to = if to == :all, do: [:comms_a, :comms_b, :comms_c], else: to
+    send(test, {:sent, from, to, message})
+    cut = %{comms_a: :comms_c, comms_c: :comms_a}
+    Swarm.Transport.transmit(from, List.wrap(to) -- [from, cut[from]], message)
+  end
+
+  test "a robot forwards between two that do not hear each other, whatever it does itself" do
+    [a, b, c] = robots = [:comms_a, :comms_b, :comms_c]
+    for id <- robots, do: talking(id, comms: [transport: {__MODULE__, :apart, [self()]}])
+    until(c, &match?(%{^a => %{direct_ms: nil}}, Board.peers(&1)))
+    until(a, &match?(%{^c => %{direct_ms: nil}}, Board.peers(&1)))
+
+    letter = %Letter{to: :all, mission: __MODULE__, version: 1, kind: :seen, fields: []}
+    Comms.say(a, [b, c], letter)
+
+    assert_receive {:sent, ^b, [^c],
+                    %Message{kind: :relay, body: %Message{from: ^a, body: ^letter}}}
   end
 
   test "malformed messages are dropped, counted and shown, and crash nobody" do

@@ -32,7 +32,7 @@ defmodule Console.Live.Fleet do
   def stop(live), do: Fleet.stop(live)
 
   @impl Console.Live
-  def offers(_live), do: [:kill, :landmark, :orders]
+  def offers(_live), do: [:kill, :landmark]
 
   @impl Console.Live
   def notice(live), do: ended(live)

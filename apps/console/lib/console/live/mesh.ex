@@ -30,7 +30,7 @@ defmodule Console.Live.Mesh do
   def notice(live), do: GenServer.call(live, :notice)
 
   @impl Console.Live
-  def offers(_live), do: [:arm, :orders]
+  def offers(_live), do: [:arm]
 
   @impl Console.Live
   def pace(_live), do: nil

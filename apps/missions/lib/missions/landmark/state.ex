@@ -50,7 +50,6 @@ defmodule Missions.Landmark.State do
                 led: 0,
                 rival_ms: nil,
                 higher_ms: nil,
-                forwarder: %Swarm.Comms.Forwarder{},
                 refused: %EpochFilter{}
               ]
 
@@ -114,7 +113,6 @@ defmodule Missions.Landmark.State do
           led: non_neg_integer(),
           rival_ms: integer() | nil,
           higher_ms: integer() | nil,
-          forwarder: Swarm.Comms.Forwarder.t(),
           refused: EpochFilter.t()
         }
 

@@ -14,10 +14,12 @@ defmodule Robot.Mission.Letter do
   @most_bytes 8_000
   @latest 65_535
 
-  @enforce_keys [:mission, :version, :kind, :fields]
+  @enforce_keys [:to, :mission, :version, :kind, :fields]
   defstruct @enforce_keys
 
+  @typedoc "`to` are its addressees: a robot that hears it may forward it to them, and to no others."
   @type t :: %__MODULE__{
+          to: :all | [atom()],
           mission: module(),
           version: 1..65_535,
           kind: atom(),
@@ -25,17 +27,18 @@ defmodule Robot.Mission.Letter do
         }
 
   @doc """
-  A letter of this mission. Raises `ArgumentError` if its own table does not allow it: that is the
-  mission's fault, as an invalid goal is.
+  A letter of this mission to one robot, to several, or to all. Raises `ArgumentError` if its own table does not allow
+  it: that is the mission's fault, as an invalid goal is.
   """
-  @spec new!(module(), kind :: atom(), fields :: keyword()) :: t()
-  def new!(mission, kind, fields) do
+  @spec new!(module(), to :: atom() | [atom()] | :all, kind :: atom(), fields :: keyword()) :: t()
+  def new!(mission, to, kind, fields) do
+    to = if to == :all, do: :all, else: List.wrap(to)
     {version, kinds} = messages(mission)
 
     case List.keyfind(kinds, kind, 0) do
       {^kind, table} when is_list(table) ->
         fields = Options.check!(fields, table, "message #{inspect(kind)}")
-        %__MODULE__{mission: mission, version: version, kind: kind, fields: fields}
+        %__MODULE__{to: to, mission: mission, version: version, kind: kind, fields: fields}
 
       _other ->
         raise ArgumentError, "#{inspect(mission)} has no message of its own #{inspect(kind)}"
@@ -45,19 +48,36 @@ defmodule Robot.Mission.Letter do
   @doc """
   Whether a term from outside has the shape of a letter: no mission has looked at its fields yet.
 
-      iex> letter = %Robot.Mission.Letter{mission: Some.Mission, version: 1, kind: :seen, fields: [point: 3]}
-      iex> for term <- [letter, %{letter | fields: [1]}, %{letter | version: 0}, :junk],
+      iex> letter = %Robot.Mission.Letter{to: :all, mission: Some.Mission, version: 1, kind: :seen, fields: [point: 3]}
+      iex> for term <- [letter, %{letter | fields: [1]}, %{letter | version: 0}, %{letter | to: [:mag1 | :mag2]}, :junk],
       ...>   do: Robot.Mission.Letter.valid?(term)
-      [true, false, false, false]
+      [true, false, false, false, false]
   """
   @spec valid?(term()) :: boolean()
   def valid?(%{__struct__: __MODULE__, mission: mission, version: version, kind: kind} = letter) do
-    is_map_key(letter, :fields) and map_size(letter) == 5 and name?(mission) and name?(kind) and
-      version in 1..@latest and :erlang.external_size(letter) <= @most_bytes and
-      Keyword.keyword?(letter.fields)
+    is_map_key(letter, :fields) and is_map_key(letter, :to) and map_size(letter) == 6 and
+      name?(mission) and name?(kind) and version in 1..@latest and
+      :erlang.external_size(letter) <= @most_bytes and Keyword.keyword?(letter.fields) and
+      to?(letter.to)
   end
 
   def valid?(_other), do: false
+
+  @doc """
+  Whether a robot is among the addressees of a letter.
+
+      iex> letter = %Robot.Mission.Letter{to: [:mag1], mission: Some.Mission, version: 1, kind: :seen, fields: []}
+      iex> for robot <- [:mag1, :mag2], do: Robot.Mission.Letter.to?(letter, robot)
+      [true, false]
+  """
+  @spec to?(t(), atom()) :: boolean()
+  def to?(%__MODULE__{to: :all}, _robot), do: true
+  def to?(%__MODULE__{to: robots}, robot), do: robot in robots
+
+  defp to?(:all), do: true
+  defp to?([]), do: true
+  defp to?([robot | others]), do: name?(robot) and to?(others)
+  defp to?(_other), do: false
 
   defp name?(term), do: is_atom(term) and term not in [nil, true, false]
 

@@ -156,7 +156,8 @@ defmodule Robot.Mission.Runner do
     {Enum.reduce(effects, runner, &note/2), effects}
   end
 
-  defp said({:tell, to, kind, fields}, module), do: {:send, to, Letter.new!(module, kind, fields)}
+  defp said({:tell, to, kind, fields}, module),
+    do: {:send, to, Letter.new!(module, to, kind, fields)}
 
   defp said({:claim, to, claim}, module) do
     %Claim{} = claim = Claim.new(module, claim)

@@ -29,7 +29,15 @@ defmodule Robot.Mission.LetterTest do
 
   test "what it says is a letter of its mission and version, and is heard as its kind" do
     {_runner, [{:send, [:mag2], letter}]} = say(:seen, point: 3)
-    assert letter == %Letter{mission: Talks, version: 3, kind: :seen, fields: [point: 3]}
+
+    assert letter == %Letter{
+             to: [:mag2],
+             mission: Talks,
+             version: 3,
+             kind: :seen,
+             fields: [point: 3]
+           }
+
     message = %{from: :mag2, kind: :mission, body: letter, hops: 0}
     {runner, []} = Runner.handle(runner(), {:message, message})
     assert runner.mission == [%{from: :mag2, kind: :seen, body: [point: 3], hops: 0}]

@@ -162,8 +162,7 @@ defmodule Sim.Trial.Event do
         unknown(event, who, [:leader, :all | robots])
 
       {:error, line} ->
-        {line |> String.split("expected ") |> List.last() |> String.replace(~r/, got .*$/s, ""),
-         ""}
+        {"a command", ": #{line}"}
     end
   end
 

@@ -56,7 +56,7 @@ defmodule Sim.Chaos.DrawTest do
         elem(event, 2)
       end
 
-    assert broken |> Enum.uniq() |> Enum.sort() == [:estop, :executive, :gate, :pilot]
+    assert broken |> Enum.uniq() |> Enum.sort() == [:comms, :estop, :executive, :gate, :pilot]
   end
 
   @tag :long

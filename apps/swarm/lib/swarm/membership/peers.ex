@@ -10,7 +10,7 @@ defmodule Swarm.Membership.Peers do
   be times of day, and clocks may be set back, so any number is accepted from a robot that is
   gone.
 
-  A heartbeat may come by way of a third robot (`Swarm.Comms.Forwarder`): it counts as a sign of
+  A heartbeat may come by way of a third robot (`Swarm.Message.Forwarder`): it counts as a sign of
   life, but not as heard. The view of the robots present has a number (`members/2`) that grows
   whenever a robot comes, goes, or comes back in another life.
   """

@@ -1,19 +1,22 @@
 defmodule Swarm.Message.Receiver do
   @moduledoc """
-  Handles the messages that a robot receives, as a function: tracks which robots are present, and
-  counts what was dropped. Pure; a part of `Swarm.Comms`.
+  Handles the messages that a robot receives, as a function: tracks which robots are present,
+  forwards to those that do not hear each other (`Swarm.Message.Forwarder`), and counts what was dropped. Pure; a part of
+  `Swarm.Comms`.
   """
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message
+  alias Swarm.Message.Forwarder
 
   @enforce_keys [:me, :peers]
-  defstruct @enforce_keys ++ [heard: 0, rejected: %{}]
+  defstruct @enforce_keys ++ [heard: 0, rejected: %{}, forwarder: Forwarder.new()]
 
   @type t :: %__MODULE__{
           me: atom(),
           peers: Peers.t(),
           heard: non_neg_integer(),
-          rejected: %{atom() => pos_integer()}
+          rejected: %{atom() => pos_integer()},
+          forwarder: Forwarder.t()
         }
 
   @typedoc """
@@ -55,6 +58,20 @@ defmodule Swarm.Message.Receiver do
       {:error, reason} ->
         {:nothing, reject(receiver, reason)}
     end
+  end
+
+  @doc "The heartbeats that this robot forwards at a tick, ten times a second."
+  @spec forward(t(), integer()) :: {t(), [Forwarder.sending()]}
+  def forward(%__MODULE__{me: me, peers: %{rows: rows}} = receiver, now_ms) do
+    {forwarder, sendings} = Forwarder.beats(receiver.forwarder, me, rows, now_ms)
+    {%{receiver | forwarder: forwarder}, sendings}
+  end
+
+  @doc "The same for a `{:message, message}` that was heard just now."
+  @spec forward(t(), Message.t(), integer()) :: {t(), [Forwarder.sending()]}
+  def forward(%__MODULE__{me: me, peers: %{rows: rows}} = receiver, message, now_ms) do
+    {forwarder, sendings} = Forwarder.letter(receiver.forwarder, me, rows, message, now_ms)
+    {%{receiver | forwarder: forwarder}, sendings}
   end
 
   @doc "Counts what was dropped, and why; possibly several of a kind at once."

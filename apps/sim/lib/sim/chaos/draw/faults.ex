@@ -45,7 +45,7 @@ defmodule Sim.Chaos.Draw.Faults do
 
   # A robot that begins anew stands until a person starts it.
   defp script(:crash, at_s, who, _loss, random) do
-    {role, random} = Random.pick(random, [:gate, :executive, :pilot, :estop])
+    {role, random} = Random.pick(random, [:gate, :executive, :pilot, :estop, :comms])
     {for_s, random} = Random.whole(random, 1, 5)
     {[{at_s, {:crash, who, role}}, {at_s + for_s, {:tell, :all, :start}}], random}
   end

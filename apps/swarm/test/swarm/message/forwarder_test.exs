@@ -1,8 +1,9 @@
-defmodule Swarm.Comms.ForwarderTest do
+defmodule Swarm.Message.ForwarderTest do
   use ExUnit.Case, async: true
+  alias Robot.Mission.Letter
   alias Swarm.Message
   alias Swarm.Agreement.Round
-  alias Swarm.Comms.Forwarder
+  alias Swarm.Message.Forwarder
   alias Swarm.Membership.{Heartbeat, Peers}
 
   # What mag2 hears from mag1 and mag3, which list these robots as heard; numbered by time.
@@ -83,6 +84,30 @@ defmodule Swarm.Comms.ForwarderTest do
     assert {_relay, [_]} = hear.(relay, %{letter | ask: true, report: nil}, 540)
     far = %{Message.new(:mag1, :round, letter) | hops: 3}
     assert {_, []} = Forwarder.letter(relay, :mag2, peers, far, 900)
+  end
+
+  test "forwards a mission's letter to its addressees, and to no other robot" do
+    {relay, _sent} = run(@apart, 4)
+    peers = peers(@apart, 400)
+
+    for {to, forwarded} <- [{:all, [[:mag3]]}, {[:mag2, :mag3], [[:mag3]]}, {[:mag2], []}] do
+      letter = %Letter{to: to, mission: __MODULE__, version: 1, kind: :seen, fields: []}
+      message = Message.new(:mag1, :mission, letter)
+      {_relay, sent} = Forwarder.letter(relay, :mag2, peers, message, 400)
+      assert for({:send, to, _relayed} <- sent, do: to) == forwarded
+
+      for {:send, _to, relayed} <- sent do
+        assert {:ok, ^relayed} = Message.check(relayed)
+        assert relayed.body == %{message | hops: 1}
+      end
+    end
+  end
+
+  test "forwards no claim: it is for the robots alone that were sent it" do
+    {relay, _sent} = run(@apart, 4)
+    claim = %Robot.Mission.Claim{mission: __MODULE__, version: 1, fields: %{}}
+    message = Message.new(:mag1, :claim, claim)
+    assert {^relay, []} = Forwarder.letter(relay, :mag2, peers(@apart, 400), message, 400)
   end
 
   test "relays only whole heartbeats and letters, wrapped once" do

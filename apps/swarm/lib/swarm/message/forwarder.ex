@@ -1,20 +1,23 @@
-defmodule Swarm.Comms.Forwarder do
+defmodule Swarm.Message.Forwarder do
   @moduledoc """
   Forwards messages between robots that do not hear each other, so that robots that are connected only through
   others act as one group. Pure.
 
   The heartbeat of each robot lists the robots that it hears. If one robot's list lacks another
-  for a while, a robot in contact with both forwards the heartbeats and round letters of the
-  latter directly to the former. If several could, the first two by name do. Letters go through
+  for a while, a robot in contact with both forwards the heartbeats and letters of the
+  latter directly to the former: those of rounds to their view, and those of missions to their addressees
+  (`Robot.Mission.Letter`). If several could, the first two by name do. Letters go through
   three relays at most; heartbeats stop where they are known. A relayed message counts as a sign
   of life, but not as heard, so that the forwarding goes on as long as it is needed.
   """
+  alias Robot.Mission
+  alias Swarm.Agreement.Round
   alias Swarm.Message
   alias Swarm.Membership.{Heartbeat, NameSet}
 
   # A robot that has just joined is not in anybody's list yet.
   @patience_ms 300
-  # Letters are repeated every 100 ms; the same letter arrives more often by several ways.
+  # Letters of rounds are repeated every 100 ms; the same letter arrives more often by several ways.
   @repeat_ms 90
   @alive_ms 1_000
   @relays 2
@@ -33,15 +36,25 @@ defmodule Swarm.Comms.Forwarder do
           heard: {[atom()], NameSet.t()}
         }
 
-  @typedoc "The peers of a percept."
-  @type peers :: %{atom() => Robot.Percept.peer()}
+  @typedoc "The robots that were heard of: their newest heartbeats, and when they were heard (`Swarm.Membership.Peers`)."
+  @type peers :: %{
+          atom() => %{
+            :beat => Heartbeat.t(),
+            :at_ms => integer(),
+            :direct_ms => integer() | nil,
+            optional(atom()) => term()
+          }
+        }
+
+  @typedoc "One message, and to which robots it goes."
+  @type sending :: {:send, [atom()], Message.t()}
 
   @doc "The state before anything is forwarded."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
   @doc "The heartbeats to forward now, as `{:send, [to], message}`."
-  @spec beats(t(), atom(), peers(), integer()) :: {t(), [{:send, [atom()], Message.t()}]}
+  @spec beats(t(), atom(), peers(), integer()) :: {t(), [sending()]}
   def beats(relay, me, peers, now_ms) do
     {names, all} = heard = heard(relay.heard, me, peers, now_ms)
 
@@ -114,20 +127,20 @@ defmodule Swarm.Comms.Forwarder do
   end
 
   @doc """
-  The same for a letter that was heard just now, for those robots of its view that do not hear its
-  sender.
+  The same for a letter that was heard just now, for those of its addressees that do not hear its
+  sender. Messages that are for the robots alone that were sent them are not forwarded.
   """
   @spec letter(t(), atom(), peers(), Message.t(), integer()) ::
-          {t(), [{:send, [atom()], Message.t()}]}
+          {t(), [sending()]}
   def letter(%{missing: missing} = relay, _me, _peers, _message, _now_ms) when missing == %{},
     do: {relay, []}
 
-  def letter(relay, me, peers, %Message{kind: :round, from: from, body: letter} = message, now_ms) do
-    content = :erlang.phash2(%{letter | remaining_ms: 0})
+  def letter(relay, me, peers, %Message{kind: kind, from: from, body: body} = message, now_ms)
+      when kind in [:round, :mission] do
+    content = content(body)
 
-    for to <- letter.view,
-        to not in [me, from],
-        is_map_key(relay.missing, {from, to}),
+    for to <- Enum.sort(for {{^from, to}, _since_ms} <- relay.missing, do: to),
+        addressed?(body, to),
         fresh?(relay.letters[{from, to}], content, now_ms),
         mine?(me, from, to, peers, now_ms),
         {:ok, relayed} <- [Message.pass_on(message, me)],
@@ -136,6 +149,14 @@ defmodule Swarm.Comms.Forwarder do
         {put_in(relay.letters[{from, to}], {content, now_ms}), [{:send, [to], relayed} | sent]}
     end
   end
+
+  def letter(relay, _me, _peers, _message, _now_ms), do: {relay, []}
+
+  defp content(%Round.Letter{} = letter), do: :erlang.phash2(%{letter | remaining_ms: 0})
+  defp content(%Mission.Letter{} = letter), do: :erlang.phash2(letter)
+
+  defp addressed?(%Round.Letter{view: view}, to), do: to in view
+  defp addressed?(%Mission.Letter{} = letter, to), do: Mission.Letter.to?(letter, to)
 
   defp fresh?({content, at_ms}, content, now_ms), do: now_ms - at_ms >= @repeat_ms
   defp fresh?(_other, _content, _now_ms), do: true
