@@ -7,7 +7,7 @@ defmodule Console.Demo do
   alias Console.Picture.RunTrack
   alias Hal.Pose
   alias Robot.Navigation.MapFile
-  alias Sim.{Recorder, Trial}
+  alias Sim.{Recorder, Scene, Trial}
   alias Sim.Recording.Pictures
   alias Sim.Trial.Coverage
 
@@ -145,7 +145,7 @@ defmodule Console.Demo do
   The first line of a run: the robots, the map, the seed and the formation, or the mission; and where the landmark
   stands, if that was chosen and is not the origin.
   """
-  @spec heading(Options.t(), Sim.Scene.t()) :: String.t()
+  @spec heading(Options.t(), Scene.t()) :: String.t()
   def heading(options, scene) do
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
       "#{options.map}, seed #{options.seed}, " <> task(options, scene)
@@ -240,9 +240,9 @@ defmodule Console.Demo do
   end
 
   defp tell(run, scene) do
-    new = Enum.drop(scene.stages, run.told)
+    new = Scene.news(scene.stages, run.told)
     Enum.each(new, &Output.line(run.output, Format.stage(&1)))
-    %{run | told: run.told + length(new)}
+    %{run | told: Scene.told(scene.stages)}
   end
 
   defp draw(run, scene),

@@ -20,6 +20,8 @@ defmodule Mcap.FileWriter do
   @second_ns 1_000_000_000
   @flush_ms 1000
   @call_ms 30_000
+  @ended "the recorder has ended"
+  @hangs "the recorder does not answer: its disk may hang"
 
   @options [
     path: [:path, required: true],
@@ -50,6 +52,42 @@ defmodule Mcap.FileWriter do
     options = Hal.Options.check!(options, @options, "recording")
     GenServer.start_link(__MODULE__, options, if(name, do: [name: name], else: []))
   end
+
+  @typedoc "A question to a recorder, whose answer comes as a message (`answer/2`)."
+  @opaque question :: :gen_server.request_id()
+
+  @doc """
+  Asks a recorder to add a note and channels `{topic, message_encoding, schema}`, without waiting for its disk. The answer is
+  `{:ok, ids, file}`.
+  """
+  @spec begin(
+          recorder(),
+          note :: {String.t(), %{String.t() => String.t()}},
+          [{String.t(), String.t(), Channel.schema() | nil}]
+        ) :: question()
+  def begin(recorder, note, channels),
+    do: :gen_server.send_request(recorder, {:begin, note, channels})
+
+  @doc "Asks when all that was sent before is in the file, without waiting. The answer is `{:ok, file}`."
+  @spec written(recorder()) :: question()
+  def written(recorder), do: :gen_server.send_request(recorder, :written)
+
+  @typedoc "What its function says."
+  @type answer ::
+          {:ok, Path.t()} | {:ok, [pos_integer()], Path.t()} | {:error, line :: String.t()}
+
+  @doc "What a message answers to a question; `nil` for any other message."
+  @spec answer(message :: term(), question()) :: answer() | nil
+  def answer(message, question), do: said(:gen_server.check_response(message, question))
+
+  @doc "The answer to a question, for which this waits."
+  @spec await(question()) :: answer()
+  def await(question), do: said(:gen_server.wait_response(question, @call_ms))
+
+  defp said({:reply, answer}), do: answer
+  defp said({:error, _ended}), do: {:error, @ended}
+  defp said(:timeout), do: {:error, @hangs}
+  defp said(:no_reply), do: nil
 
   @doc "The id of a channel, as `Mcap.Writer.channel/5`; the same in all files of a folder."
   @spec channel(recorder(), String.t(), String.t(), Channel.schema() | nil, map()) ::
@@ -88,18 +126,23 @@ defmodule Mcap.FileWriter do
   defp call(recorder, what) do
     GenServer.call(recorder, what, @call_ms)
   catch
-    :exit, {:timeout, _call} -> {:error, "the recorder does not answer: its disk may hang"}
-    :exit, _reason -> {:error, "the recorder has ended"}
+    :exit, {:timeout, _call} -> {:error, @hangs}
+    :exit, _reason -> {:error, @ended}
   end
 
   @impl GenServer
   def init(options) do
     # To end the file when whoever started this ends.
     Process.flag(:trap_exit, true)
+    # A disk that hangs must not hold up the caller.
+    {:ok, %__MODULE__{path: options[:path]}, {:continue, options}}
+  end
+
+  @impl GenServer
+  def handle_continue(options, state) do
     {path, options} = Keyword.pop!(options, :path)
     {limit, options} = Keyword.pop!(options, :limit_bytes)
-    opened = Output.open(path, limit, [{:chunk_ns, @second_ns} | options])
-    {:ok, took(%__MODULE__{path: path}, opened)}
+    {:noreply, took(state, Output.open(path, limit, [{:chunk_ns, @second_ns} | options]))}
   end
 
   @impl GenServer
@@ -130,6 +173,18 @@ defmodule Mcap.FileWriter do
     error in ArgumentError -> {:reply, {:error, error.message}, state}
   end
 
+  def handle_call({:begin, {name, pairs}, channels}, from, state) do
+    with {:reply, :ok, state} <- handle_call({:metadata, name, pairs}, from, state) do
+      {ids, state} = Enum.map_reduce(channels, state, &begun/2)
+      {:reply, {:ok, ids, Output.name(state.output)}, state}
+    end
+  end
+
+  def handle_call(:written, from, state) do
+    with {:reply, :ok, %{output: %Output{}} = state} <- handle_call(:flush, from, state),
+         do: {:reply, {:ok, Output.name(state.output)}, state}
+  end
+
   def handle_call(:file, _from, %{error: nil, output: %Output{} = output} = state),
     do: {:reply, {:ok, Output.name(output)}, state}
 
@@ -148,6 +203,11 @@ defmodule Mcap.FileWriter do
 
   @impl GenServer
   def terminate(_reason, state), do: finished(state)
+
+  defp begun({topic, encoding, schema}, state) do
+    {id, writer} = Writer.channel(state.output.writer, topic, encoding, schema)
+    {id, %{state | output: %{state.output | writer: writer}}}
+  end
 
   defp flush_later(%{timer: nil, output: %Output{}} = state),
     do: %{state | timer: Process.send_after(self(), :flush, @flush_ms)}

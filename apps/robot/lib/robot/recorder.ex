@@ -11,9 +11,9 @@ defmodule Robot.Recorder do
 
   Nothing that goes wrong here concerns a robot: its processes send to this one without waiting,
   and only so much (`Robot.Recorder.Queue`); what is too much is lost, counted and recorded as lost.
-  Without this process, nothing is sent. If the file cannot be written, the events
+  Without this process, nothing is sent. If the file cannot be written, or the disk does not answer for a second, the events
   `[:robot, :recorder, :failed]` and `[:robot, :recorder, :healed]` say so; a folder is tried again
-  every 10 s. A crash is up to its supervisor; the next recorder begins a new file.
+  every 10 s, and a disk that hangs is given up after 30 s. A crash is up to its supervisor; the next recorder begins a new file.
 
   Each file begins with a checkpoint of each role, and has one each minute.
   """
@@ -25,6 +25,8 @@ defmodule Robot.Recorder do
   @roles Queue.roles()
   @write_ms 1_000
   @again_ms 10_000
+  @hangs_ms 1_000
+  @given_up_ms 30_000
   @checkpoint_ms 60_000
   # What comes in faster is written sooner.
   @most_entries 5_000
@@ -100,13 +102,17 @@ defmodule Robot.Recorder do
       output: nil,
       failed: nil,
       entries: [],
+      sent: 0,
+      owed: [],
       count: 0,
+      slow: nil,
       written: 0,
       lost: 0,
       # The machine's clock may be set; times in a file must not go back.
       unix_ms: System.os_time(:millisecond) - now_ms,
       asked_ms: now_ms,
-      tried_ms: now_ms
+      tried_ms: now_ms,
+      since_ms: now_ms
     }
 
     case Enum.find_value(queues, :ok, &registered/1) do
@@ -132,11 +138,11 @@ defmodule Robot.Recorder do
     lost =
       s.lost + (s.queues |> Enum.map(fn {_id, queue} -> Queue.untold(queue) end) |> Enum.sum())
 
-    {:reply, %{file: file, failed: s.failed, entries: s.written, lost: lost}, s}
+    {:reply, %{file: file, failed: s.failed || s.slow, entries: s.written, lost: lost}, s}
   end
 
   def handle_call(:close, _from, s) do
-    s = s |> arrived() |> missed() |> write()
+    s = s |> arrived() |> missed() |> settled() |> write() |> settled()
     {:reply, closed(s), %{s | output: nil, failed: s.failed || "is closed"}}
   end
 
@@ -144,7 +150,6 @@ defmodule Robot.Recorder do
   def handle_info({:entry, id, {role, _kind, _what, at_ms} = entry, now_ms}, s)
       when is_map_key(s.queues, id) and role in @roles and is_integer(at_ms) and
              is_integer(now_ms) do
-    Queue.taken(s.queues[id], role)
     s = take(s, id, entry, now_ms)
     {:noreply, if(s.count >= @most_entries, do: write(s), else: s)}
   end
@@ -160,10 +165,11 @@ defmodule Robot.Recorder do
   def handle_info({:picture, id, picture}, %{pictures: pictures} = s)
       when pictures != nil and is_map_key(s.robots, id) do
     Pictures.taken(pictures, id)
-    {:noreply, %{s | shots: [{id, picture} | s.shots]}}
+    {:noreply, if(s.slow, do: s, else: %{s | shots: [{id, picture} | s.shots]})}
   end
 
-  def handle_info(:write, s), do: {:noreply, s |> write() |> minute() |> again() |> later()}
+  def handle_info(:write, s),
+    do: {:noreply, s |> hangs() |> write() |> minute() |> again() |> later()}
 
   def handle_info({:EXIT, writer, reason}, %{output: %Output{writer: writer}} = s),
     do: {:noreply, fail(s, "the writer of its file has ended: #{inspect(reason)}")}
@@ -175,9 +181,18 @@ defmodule Robot.Recorder do
 
   def handle_info({:EXIT, _other, _reason}, s), do: {:noreply, s}
 
+  def handle_info(message, %{output: %Output{} = output} = s) do
+    case Output.heard(output, message) do
+      nil -> {:noreply, s}
+      news -> {:noreply, news(s, news)}
+    end
+  end
+
+  def handle_info(_late, s), do: {:noreply, s}
+
   @impl GenServer
   def terminate(_reason, s) do
-    _ = s |> arrived() |> missed() |> write() |> closed()
+    _ = s |> arrived() |> missed() |> settled() |> write() |> settled() |> closed()
     :ok
   end
 
@@ -192,7 +207,6 @@ defmodule Robot.Recorder do
       {:entry, id, {role, _kind, _what, at_ms} = entry, now_ms}
       when is_map_key(s.queues, id) and role in @roles and is_integer(at_ms) and
              is_integer(now_ms) ->
-        Queue.taken(s.queues[id], role)
         arrived(take(s, id, entry, now_ms))
     after
       0 -> s
@@ -226,8 +240,14 @@ defmodule Robot.Recorder do
   defp take(s, id, entry, _now_ms), do: add(s, id, entry)
 
   # Entries that nobody can write are nothing to wait with.
-  defp add(%{output: nil, failed: failed} = s, _id, _entry) when failed != nil, do: s
-  defp add(s, id, entry), do: %{s | entries: [{id, entry} | s.entries], count: s.count + 1}
+  defp add(%{output: nil, failed: failed} = s, id, entry) when failed != nil,
+    do: taken(s, [{id, entry}])
+
+  # While a disk hangs, what comes counts as under way until it is written: only so much is kept.
+  defp add(%{slow: nil} = s, id, entry), do: s |> taken([{id, entry}]) |> keep(id, entry)
+  defp add(s, id, entry), do: keep(%{s | owed: [{id, entry} | s.owed]}, id, entry)
+
+  defp keep(s, id, entry), do: %{s | entries: [{id, entry} | s.entries], count: s.count + 1}
 
   # A state tells the body, and the time at which it was sent the offset of the robot's clock.
   defp know(s, id, state, offset_ms) do
@@ -238,28 +258,66 @@ defmodule Robot.Recorder do
     put_in(s.robots[id], %{offset_ms: offset_ms, profile: profile})
   end
 
-  defp open(s) do
-    case Output.open(s.file, s.ids, s.rate != nil) do
-      {:ok, output} ->
-        Enum.each(s.queues, fn {_id, queue} -> Queue.ask(queue) end)
-        if s.failed, do: tell(s, :healed, %{file: output.file})
-        %{s | output: output, failed: nil}
+  defp taken(s, entries) do
+    for {id, {role, _kind, _what, _at_ms}} <- entries, do: Queue.taken(s.queues[id], role)
+    s
+  end
 
-      {:error, line} ->
-        fail(s, line)
+  defp open(s) do
+    %{s | output: Output.open(s.file, s.ids, s.rate != nil), since_ms: Hal.Clock.now_ms()}
+  end
+
+  defp news(s, {:open, output}) do
+    Enum.each(s.queues, fn {_id, queue} -> Queue.ask(queue) end)
+    if s.failed || s.slow, do: tell(s, :healed, %{file: output.file})
+    %{taken(s, s.owed) | output: output, failed: nil, slow: nil, owed: []}
+  end
+
+  defp news(s, {:written, output, turned?}) do
+    if s.slow, do: tell(s, :healed, %{file: output.file})
+    s = taken(s, s.owed)
+    s = %{s | output: output, slow: nil, owed: [], written: s.written + s.sent, sent: 0}
+    if turned?, do: ask(s), else: s
+  end
+
+  defp news(s, {:error, line}), do: fail(s, line)
+
+  # For the end of a file.
+  defp settled(%{output: %Output{question: question} = output} = s) when question != nil,
+    do: news(s, Output.await(output))
+
+  defp settled(s), do: s
+
+  defp hangs(%{output: %Output{question: question}} = s) when question != nil do
+    case Hal.Clock.now_ms() - s.since_ms do
+      ms when ms >= @given_up_ms -> fail(s, "its disk has not answered for #{div(ms, 1_000)} s")
+      ms when ms >= @hangs_ms and s.slow == nil -> slow(s, "its disk does not answer")
+      _soon -> s
     end
+  end
+
+  defp hangs(s), do: s
+
+  defp slow(s, line) do
+    line = "#{s.file[:path]}: #{line}"
+    tell(s, :failed, %{line: line})
+    %{s | slow: line}
   end
 
   # The first error is told, and its successors only when it was over meanwhile.
   defp fail(s, line) do
     if s.failed == nil, do: tell(s, :failed, %{line: line})
     if s.output, do: Output.abandon(s.output)
+    s = taken(s, s.owed)
 
     %{
       s
       | output: nil,
         failed: s.failed || line,
+        slow: nil,
         entries: [],
+        sent: 0,
+        owed: [],
         count: 0,
         shots: [],
         tried_ms: Hal.Clock.now_ms()
@@ -272,20 +330,15 @@ defmodule Robot.Recorder do
   end
 
   defp write(%{output: nil} = s), do: %{s | entries: [], count: 0, shots: []}
+  # One after the other: what comes meanwhile waits, and counts as under way.
+  defp write(%{output: %Output{question: question}} = s) when question != nil, do: s
 
   defp write(s) do
-    ns = (Hal.Clock.now_ms() + s.unix_ms) * 1_000_000
-
+    now_ms = Hal.Clock.now_ms()
+    ns = (now_ms + s.unix_ms) * 1_000_000
     {entries, shots} = {Enum.reverse(s.entries), Enum.reverse(s.shots)}
-
-    case Output.write(s.output, entries, shots, s.robots, ns) do
-      {:ok, output, turned?} ->
-        s = %{s | output: output, entries: [], count: 0, shots: [], written: s.written + s.count}
-        if turned?, do: ask(s), else: s
-
-      {:error, line} ->
-        fail(s, line)
-    end
+    output = Output.write(s.output, entries, shots, s.robots, ns)
+    %{s | output: output, sent: s.count, entries: [], count: 0, shots: [], since_ms: now_ms}
   end
 
   defp closed(%{output: nil, failed: nil}), do: :ok

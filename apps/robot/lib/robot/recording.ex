@@ -7,18 +7,18 @@ defmodule Robot.Recording do
 
   | topic | message |
   |---|---|
-  | `/convoy/robot` | the version, the profile of each robot, and the offset of its clock; at the beginning of a file, and when one of them changes |
+  | `/convoy/robot` | the version, all names (`Robot.Recording.Names`), the profile of each robot, and the offset of its clock; at the beginning of a file, and when one of them changes |
   | `/convoy/trace` | each second: what went into and out of the robots' processes, in order (`Robot.Trace`) |
 
   References and processes are written as text (`Robot.Recording.Terms`), and the profile of its
   robot, which is in each percept, as a mark.
   """
   alias Hal.Profile
-  alias Robot.Recording.Terms
+  alias Robot.Recording.{Names, Terms}
   alias Robot.Replay
   alias Robot.Replay.Roles
 
-  @version 2
+  @version 3
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"
@@ -38,32 +38,48 @@ defmodule Robot.Recording do
   def metadata(robots),
     do: %{"version" => "#{@version}", "live" => Enum.map_join(robots, ",", &Atom.to_string/1)}
 
-  @doc "The content of a message about the robots."
-  @spec robots(robots()) :: binary()
-  def robots(robots), do: write({:convoy_robots, @version, robots})
+  @doc "The content of a message about the robots, with all names that the file has up to then."
+  @spec robots(robots(), Names.t()) :: binary()
+  def robots(robots, names) do
+    names = Names.add(names, robots)
+    write({:convoy_robots, @version, Names.texts(names), write(robots)})
+  end
 
   @doc """
-  The content of a message with entries, in their order.
+  The content of a message with entries, in their order, and the names with those of the entries.
 
       iex> entry = {:mag1, {:gate, :input, :step, 50}}
-      iex> bytes = Robot.Recording.trace([entry], %{})
+      iex> {bytes, _names} = Robot.Recording.trace([entry], %{}, MapSet.new())
       iex> Robot.Recording.read_trace(bytes, %{})
       {:ok, [entry]}
   """
-  @spec trace([Replay.entry()], robots()) :: binary()
-  def trace(entries, robots) do
-    write(for {id, entry} <- entries, do: {id, Terms.portable(entry, profile(robots, id))})
+  @spec trace([Replay.entry()], robots(), Names.t()) :: {binary(), Names.t()}
+  def trace(entries, robots, names) do
+    portable = for {id, entry} <- entries, do: {id, Terms.portable(entry, profile(robots, id))}
+    {write(portable), Names.add(names, portable)}
   end
 
-  @doc "The robots from a message about them."
-  @spec read_robots(binary()) :: {:ok, robots()} | {:error, line :: String.t()}
-  def read_robots(bytes) do
+  @doc """
+  The robots from a message about them, whose names become known to this program. At most `left` may be new; returns how many may be
+  after that.
+  """
+  @spec read_robots(binary(), left :: non_neg_integer()) ::
+          {:ok, robots(), left :: non_neg_integer()} | {:error, line :: String.t()}
+  def read_robots(bytes, left \\ Names.most()) do
     case read(bytes, @most_bytes) do
-      {:ok, {:convoy_robots, @version, %{} = robots}} ->
-        if Enum.all?(robots, &robot?/1), do: {:ok, robots}, else: strange()
+      {:ok, {:convoy_robots, @version, names, robots}} when is_binary(robots) ->
+        with {:ok, left} <- Names.know(names, left),
+             {:ok, %{} = robots} <- read(robots, @most_bytes),
+             true <- Enum.all?(robots, &robot?/1) do
+          {:ok, robots, left}
+        else
+          {:error, line} -> {:error, line}
+          _other -> strange()
+        end
 
-      {:ok, {:convoy_robots, version, _robots}} when is_integer(version) ->
-        {:error, "is a recording of version #{version}; this program reads version #{@version}"}
+      {:ok, other} when elem(other, 0) == :convoy_robots and is_integer(elem(other, 1)) ->
+        {:error,
+         "is a recording of version #{elem(other, 1)}; this program reads version #{@version}"}
 
       _other ->
         strange()

@@ -18,6 +18,20 @@ defmodule Robot.RecorderTest do
   File.rmdir!(@probe)
   @mounts status == 0
 
+  # One that can be frozen, so that every write to it waits.
+  tools = Enum.all?(~w(mkfs.ext4 fsfreeze losetup), &System.find_executable/1)
+  loop = tools and match?({_path, 0}, System.cmd("losetup", ["-f"], stderr_to_stdout: true))
+  @freezes @mounts and loop
+
+  defp image, do: Path.join(System.tmp_dir!(), "recorder-#{System.pid()}.img")
+
+  defp mounted(folder) do
+    File.write!(image(), :binary.copy(<<0>>, 4_000_000))
+    {_said, 0} = System.cmd("mkfs.ext4", ["-q", "-F", image()], stderr_to_stdout: true)
+    {_said, 0} = System.cmd("mount", ["-o", "loop", image(), folder], stderr_to_stdout: true)
+    :ok
+  end
+
   defp recorder(options) do
     id = make_ref()
     start_supervised!(%{id: id, start: {Recorder, :start_link, [options]}, restart: :temporary})
@@ -295,6 +309,49 @@ defmodule Robot.RecorderTest do
       assert Recorder.close(recorder) == {:error, line}
       assert {_file, counts, []} = replayed(path)
       assert counts[{:rec7, :gate}].decisions > 3
+    end
+  end
+
+  describe "a disk that hangs" do
+    unless @freezes, do: @describetag(skip: "no file system can be frozen here")
+
+    test "is told within some 2 s, costs the robot nothing, and loses what it had no room for", %{
+      tmp_dir: folder
+    } do
+      :ok = mounted(folder)
+
+      on_exit(fn ->
+        _whole = System.cmd("fsfreeze", ["-u", folder], stderr_to_stdout: true)
+        {_said, 0} = System.cmd("umount", ["-l", folder])
+        File.rm!(image())
+      end)
+
+      runs = Path.join(folder, "runs")
+      listen(:rec9, [:robot, :recorder, :failed])
+      listen(:rec9, [:robot, :recorder, :healed])
+      recorder = recorder(robots: [:rec9], file: [path: runs, limit_bytes: 0x40_0000], bound: 40)
+      id = rolling_on(:rec9)
+      :ok = Pilot.start(id)
+      ticks(12)
+
+      {_said, 0} = System.cmd("fsfreeze", ["-f", folder])
+      asked_ms = Hal.Clock.now_ms()
+      assert_receive {[:robot, :recorder, :failed], %{line: line}}, 10_000
+      assert Hal.Clock.now_ms() - asked_ms < 3_000
+      assert line == "#{runs}: its disk does not answer"
+      assert %{failed: ^line} = Recorder.status(recorder)
+      ticks(40)
+      {_said, 0} = System.cmd("fsfreeze", ["-u", folder])
+      assert_receive {[:robot, :recorder, :healed], _about}, 10_000
+      assert %{failed: nil, lost: lost} = Recorder.status(recorder)
+      assert lost > 0
+
+      ticks(12)
+      stop_supervised!(id)
+      assert Recorder.close(recorder) == :ok
+      assert {_file, counts, []} = replayed(Path.join(runs, Folder.name(1)))
+      assert counts[{:rec9, :executive}].lost > 0
+      assert counts[{:rec9, :executive}].decisions > 20
     end
   end
 end

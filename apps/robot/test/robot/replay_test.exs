@@ -10,6 +10,7 @@ defmodule Robot.ReplayTest do
   doctest Robot.Replay
   doctest Robot.Replay.Roles
   doctest Robot.Recording
+  doctest Robot.Recording.Names
   doctest Robot.Recording.Terms
 
   defmodule Fragile do
@@ -250,13 +251,18 @@ defmodule Robot.ReplayTest do
     ]
 
     robots = %{mag1: %{offset_ms: 7, profile: profile}}
-    bytes = Recording.trace(entries, robots)
+    {bytes, names} = Recording.trace(entries, robots, MapSet.new())
     assert Recording.read_trace(bytes, robots) == {:ok, entries}
-    assert Recording.read_robots(Recording.robots(robots)) == {:ok, robots}
+    told = Recording.robots(robots, names)
+    assert Recording.read_robots(told, 0) == {:ok, robots, 0}
     assert byte_size(bytes) < div(byte_size(:erlang.term_to_binary(entries)), 2)
 
-    assert {:error, "is a recording of version 99; this program reads version 2"} =
-             Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 99, %{}}))
+    for {version, more} <- [{2, [%{}]}, {99, [[], <<>>, 1]}] do
+      message = List.to_tuple([:convoy_robots, version | more])
+
+      assert {:error, "is a recording of version #{version}; this program reads version 3"} ==
+               Recording.read_robots(:erlang.term_to_binary(message))
+    end
 
     # Of a program whose states had other parts, or a file that somebody made.
     old = Map.delete(begun(), :presses)
@@ -266,13 +272,18 @@ defmodule Robot.ReplayTest do
       assert {:error, "has entries that" <> _} = Recording.read_trace(bytes, %{})
     end
 
-    for robots <- [
-          %{1 => %{offset_ms: 0, profile: nil}},
-          %{mag1: 1},
-          %{mag1: %{offset_ms: 0.5, profile: nil}}
+    for {names, robots} <- [
+          {[], %{1 => %{offset_ms: 0, profile: nil}}},
+          {[], %{mag1: 1}},
+          {[], %{mag1: %{offset_ms: 0.5, profile: nil}}},
+          {["mag1" | "mag2"], %{}},
+          {[1], %{}},
+          {%{}, %{}}
         ] do
+      bytes = :erlang.term_to_binary(robots)
+
       assert {:error, "begins with something" <> _} =
-               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 2, robots}))
+               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 3, names, bytes}))
     end
 
     junk = [<<>>, "junk", <<131, 80, 0xFFFFFFFF::32, 0>>, :erlang.term_to_binary([{:mag1, 3}])]
@@ -280,5 +291,35 @@ defmodule Robot.ReplayTest do
 
     none = [{:mag1, {:gate, :input, {:"$convoy_reference", "x"}, 1}}]
     assert {:error, _line} = Recording.read_trace(:erlang.term_to_binary(none), %{})
+  end
+
+  test "names of another machine are read, so many of a file, and nothing else becomes an atom" do
+    # As text and bytes only: the compiler would make atoms of them.
+    new = fn prefix, count -> for n <- 1..count, do: "#{prefix}_#{n}" end
+    robot = <<119, 9, "rover7_ab">>
+    <<131, state::binary>> = :erlang.term_to_binary(%{offset_ms: 5, profile: nil})
+    robots = <<131, 116, 1::32, robot::binary, state::binary>>
+    told = &:erlang.term_to_binary({:convoy_robots, 3, &1, robots})
+
+    assert {:error, "begins with something" <> _} = Recording.read_robots(told.([]))
+    assert {:ok, %{} = read, 998} = Recording.read_robots(told.(["rover7_ab", "base9_ab@hall"]))
+    assert [{id, %{offset_ms: 5}}] = Map.to_list(read)
+    assert Atom.to_string(id) == "rover7_ab"
+
+    atoms = :erlang.system_info(:atom_count)
+
+    for {name, line} <- [
+          {"two words_ab", "names what is no name"},
+          {String.duplicate("long_ab", 20), "names what is no name"},
+          {<<255, "ab">>, "names what is no name"}
+        ] do
+      assert {:error, told} = Recording.read_robots(told.([name]))
+      assert String.starts_with?(told, line)
+    end
+
+    assert :erlang.system_info(:atom_count) == atoms
+    assert {:error, line} = Recording.read_robots(told.(new.("many", 30)), 10)
+    assert line == "has more than 1000 names that this program does not know"
+    assert :erlang.system_info(:atom_count) == atoms + 10
   end
 end

@@ -13,6 +13,8 @@ defmodule Sim.Fleet do
   alias Sim.Trial.{Evaluation, RunLog, Script, Setup, Termination}
 
   @period_ms 100
+  # Of what happens to a fleet that may run for weeks.
+  @kept 1_000
 
   @doc """
   Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`,
@@ -128,7 +130,7 @@ defmodule Sim.Fleet do
       backend: backend,
       epoch_ms: epoch_ms,
       script: Script.new(options.moves, options.kills),
-      run_log: RunLog.new(elem(setup.mission, 0)),
+      run_log: RunLog.new(elem(setup.mission, 0), @kept),
       said: [],
       ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)

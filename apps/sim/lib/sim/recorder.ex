@@ -6,7 +6,7 @@ defmodule Sim.Recorder do
 
   The run's times count from zero, so that a run from a seed gives the same file. A write that
   fails ends the recording, not the run, and what was written before stays whole; an ffmpeg that fails ends the pictures;
-  `close/1` says so.
+  `close/1` says so. A disk that does not answer for a second is told on standard error, and the run waits for it.
   """
   use GenServer
   alias Mcap.FileWriter.{Disk, Output}
@@ -20,6 +20,7 @@ defmodule Sim.Recorder do
   # The run waits for its recorder after so many ticks, so that it never gets far ahead.
   @ahead 50
   @chunk_ms 1_000
+  @hangs_ms 1_000
   # A tick makes ten thousand words of garbage.
   @room [min_heap_size: 100_000]
 
@@ -34,7 +35,7 @@ defmodule Sim.Recorder do
 
     # Whether it can be opened is known before there is a process that would end for it.
     with :ok <- if(pictures?, do: able(path), else: :ok),
-         :ok <- Disk.named(File.write(path, ""), path),
+         :ok <- Disk.named(patient(fn -> File.write(path, "") end), path),
          do: GenServer.start_link(__MODULE__, {path, setup, pictures?}, spawn_opt: @room)
   end
 
@@ -52,8 +53,22 @@ defmodule Sim.Recorder do
     {_at_ms, _bytes, facts} = tick = Topics.prepare(tick, for({id, _frame} <- frames, do: id))
     frames = for {id, frame} <- frames, List.keymember?(facts.seen, id, 0), do: {id, frame}
     GenServer.cast(recorder, {:tick, tick, scene, frames})
-    if rem(div(at_ms, 100), @ahead) == 0, do: GenServer.call(recorder, :reached, :infinity)
-    :ok
+
+    if rem(div(at_ms, 100), @ahead) == 0,
+      do: patient(fn -> GenServer.call(recorder, :reached, :infinity) end),
+      else: :ok
+  end
+
+  # Waits for a disk, and says so if it takes long.
+  defp patient(function) do
+    task = Task.async(function)
+
+    with nil <- Task.yield(task, @hangs_ms) do
+      # The commands that record are silent in the log.
+      IO.puts(:stderr, "the disk of the recording does not answer; the run waits for it")
+      {:ok, Task.await(task, :infinity)}
+    end
+    |> then(fn {:ok, result} -> result end)
   end
 
   @doc "Ends the recording; the error says in one line why it is not whole."

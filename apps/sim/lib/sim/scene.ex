@@ -39,7 +39,10 @@ defmodule Sim.Scene do
           size_ppm: non_neg_integer() | nil
         }
 
-  @typedoc "Something that happened to the fleet; the newest is the last of the list."
+  @typedoc """
+  Something that happened to the fleet; the newest is the last of the list. A fleet without an end keeps only the newest, and
+  numbers them (`n`).
+  """
   @type stage :: %{
           required(:stage) => atom(),
           required(:at_s) => number(),
@@ -48,7 +51,8 @@ defmodule Sim.Scene do
           optional(:size_ppm) => integer() | nil,
           optional(:as) => atom(),
           optional(:asked) => String.t(),
-          optional(:followers) => non_neg_integer()
+          optional(:followers) => non_neg_integer(),
+          optional(:n) => pos_integer()
         }
 
   @type t :: %__MODULE__{
@@ -116,4 +120,28 @@ defmodule Sim.Scene do
   """
   @spec stage(t()) :: stage() | nil
   def stage(%__MODULE__{stages: stages}), do: List.last(stages)
+
+  @doc """
+  How many stages there have been, with those that are no longer kept.
+
+      iex> {Sim.Scene.told([%{stage: :formed, at_s: 1}]), Sim.Scene.told([%{stage: :formed, at_s: 1, n: 7}])}
+      {1, 7}
+  """
+  @spec told([stage()]) :: non_neg_integer()
+  def told(stages) do
+    case List.last(stages) do
+      %{n: n} -> n
+      _none_or_all -> length(stages)
+    end
+  end
+
+  @doc """
+  The stages after so many, as far as they are kept.
+
+      iex> stages = for n <- 5..7, do: %{stage: :formed, at_s: n, n: n}
+      iex> for told <- [2, 6, 7], do: stages |> Sim.Scene.news(told) |> Enum.map(& &1.n)
+      [[5, 6, 7], [7], []]
+  """
+  @spec news([stage()], told :: non_neg_integer()) :: [stage()]
+  def news(stages, told), do: Enum.take(stages, -max(told(stages) - told, 0))
 end

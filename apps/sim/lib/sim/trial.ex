@@ -57,11 +57,13 @@ defmodule Sim.Trial do
     do: with({:ok, setup} <- Setup.new(options), :ok <- timeless(setup), do: {:ok, setup})
 
   @doc """
-  The trial with that start. With `record: true` it keeps what happens, until `take_entries/1` takes it.
+  The trial with that start. With `record: true` it keeps what happens, until `take_entries/1` takes it; with `keep`, of the stages
+  and claims of a run without an end only the newest.
   """
-  @spec begin(Setup.t(), record: boolean()) :: t()
+  @spec begin(Setup.t(), record: boolean(), keep: pos_integer()) :: t()
   def begin(%Setup{} = setup, options \\ []) do
     trial = still(setup)
+    trial = %{trial | run_log: RunLog.new(elem(setup.mission, 0), options[:keep])}
     trial = if options[:record], do: %{trial | entries: []}, else: trial
     command(trial, :all, :start)
   end

@@ -20,11 +20,14 @@ defmodule Console.Live.Trial do
   @behaviour Console.Live
 
   @done {:ok, "done"}
+  # Of what happens in a run that a person may leave on.
+  @kept 1_000
 
   @doc "Starts the run of a new trial; the error says in one line what is wrong with its options."
   @spec start_link(module(), map(), Pace.t()) :: {:ok, pid()} | {:error, String.t()}
   def start_link(module, options, pace \\ Pace.new()) do
-    with {:ok, trial} <- module.new(options) do
+    with {:ok, setup} <- module.setup(options) do
+      trial = module.begin(setup, keep: @kept)
       GenServer.start_link(__MODULE__, {module, trial, pace, nil})
     end
   end
@@ -36,7 +39,7 @@ defmodule Console.Live.Trial do
   @spec start_recorded(Sim.Trial.Setup.t(), Pace.t(), recorder :: pid(), number() | nil) ::
           {:ok, pid()}
   def start_recorded(setup, pace, recorder, pictures \\ nil) do
-    trial = Trial.begin(setup, record: true)
+    trial = Trial.begin(setup, record: true, keep: @kept)
     GenServer.start_link(__MODULE__, {Trial, trial, pace, {recorder, pictures}})
   end
 

@@ -75,17 +75,9 @@ defmodule Console.Page.State do
       estop: Format.estop(scene),
       landmark: point(scene.landmark),
       robots: Enum.map(scene.robots, &robot/1),
-      told: told(scene.stages),
+      told: Scene.told(scene.stages),
       stages: scene.stages |> Enum.take(-@stages) |> Enum.map(&stage/1)
     })
-  end
-
-  # A fleet that forgets its oldest stages numbers them.
-  defp told(stages) do
-    case List.last(stages) do
-      %{n: n} -> n
-      _none_or_all -> length(stages)
-    end
   end
 
   defp robot(robot) do

@@ -11,6 +11,7 @@ defmodule Console.Terminal.Session do
   alias Console.Prompt
   alias Console.Terminal.Tty
   alias Console.Terminal.Editor
+  alias Sim.Scene
 
   @draw_ms 100
   # A key is shown after this time, together with all that came meanwhile: pasted text comes fast.
@@ -302,9 +303,9 @@ defmodule Console.Terminal.Session do
   defp tell(%{mode: :screen} = session, _scene), do: session
 
   defp tell(session, scene) do
-    new = Enum.drop(scene.stages, session.told)
+    new = Scene.news(scene.stages, session.told)
     Enum.each(new, &Output.line(session.output, Format.stage(&1)))
-    session = %{session | told: session.told + length(new)}
+    session = %{session | told: Scene.told(scene.stages)}
 
     if scene.at_ms >= session.status_s * 1000 do
       Output.line(session.output, Format.status(scene))

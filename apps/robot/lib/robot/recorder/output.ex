@@ -6,65 +6,93 @@ defmodule Robot.Recorder.Output do
   alias Robot.{Recording, Replay}
   alias Robot.Recording.Topics
 
-  @enforce_keys [:writer, :channels, :file, :robots, :topics]
-  defstruct @enforce_keys
+  @enforce_keys [:writer, :keys, :topics]
+  defstruct @enforce_keys ++
+              [channels: %{}, file: nil, names: MapSet.new(), said: nil, question: nil]
 
-  @typedoc "`file` is the one that is written now; `robots` what it says of them."
+  @typedoc """
+  `file` is the one that is written now, `nil` until it is open; `names` are all that were written, `said` the robots and the names that
+  the file tells. `question` is what the writer was asked and has not answered yet.
+  """
   @type t :: %__MODULE__{
           writer: pid(),
+          keys: [term()],
           channels: %{term() => pos_integer()},
-          file: Path.t(),
-          robots: Recording.robots(),
-          topics: Topics.t()
+          file: Path.t() | nil,
+          names: Recording.Names.t(),
+          said: {Recording.robots(), Recording.Names.t()} | nil,
+          topics: Topics.t(),
+          question: FileWriter.question() | nil
         }
   @type picture :: {robot :: atom(), Vision.View.Picture.t()}
-  @type result :: {:ok, t()} | {:error, line :: String.t()}
 
   @doc """
-  Opens a file, or the next one of a folder (options of `Mcap.FileWriter`), for these robots, with
+  Begins to open a file, or the next one of a folder (options of `Mcap.FileWriter`), for these robots, with
   pictures or without.
   """
-  @spec open(keyword(), [atom()], pictures? :: boolean()) :: result()
+  @spec open(keyword(), [atom()], pictures? :: boolean()) :: t()
   def open(options, ids, pictures?) do
     {:ok, writer} = FileWriter.start_link(options)
     {robots, trace, encoding} = Recording.topics()
 
     topics =
-      for(topic <- [robots, trace], do: {topic, topic, encoding, nil}) ++
-        for {key, topic, schema} <- Topics.list(ids, pictures?), do: {key, topic, "json", schema}
+      for(topic <- [robots, trace], do: {topic, {topic, encoding, nil}}) ++
+        for {key, topic, schema} <- Topics.list(ids, pictures?),
+            do: {key, {topic, "json", schema}}
 
-    with :ok <- FileWriter.metadata(writer, "convoy", Recording.metadata(ids)),
-         {:ok, channels} <- channels(writer, topics, %{}),
-         {:ok, file} <- FileWriter.file(writer) do
-      {:ok,
-       %__MODULE__{
-         writer: writer,
-         channels: channels,
-         file: file,
-         robots: %{},
-         topics: %Topics{pictures?: pictures?}
-       }}
-    else
-      {:error, line} ->
-        end_writer(writer)
-        {:error, line}
-    end
+    note = {"convoy", Recording.metadata(ids)}
+
+    %__MODULE__{
+      writer: writer,
+      keys: Enum.map(topics, &elem(&1, 0)),
+      topics: %Topics{pictures?: pictures?},
+      question: FileWriter.begin(writer, note, Enum.map(topics, &elem(&1, 1)))
+    }
   end
 
-  defp channels(_writer, [], channels), do: {:ok, channels}
+  @typedoc """
+  The file is open, or what was sent is on the disk (`turned?`: and a new file of the folder was begun, which has no
+  states yet).
+  """
+  @type news ::
+          {:open, t()} | {:written, t(), turned? :: boolean()} | {:error, line :: String.t()}
 
-  defp channels(writer, [{key, topic, encoding, schema} | rest], channels) do
-    with {:ok, id} <- FileWriter.channel(writer, topic, encoding, schema),
-         do: channels(writer, rest, Map.put(channels, key, id))
+  @doc "What a message of the writer says; `nil` for one that answers no question."
+  @spec heard(t(), message :: term()) :: news() | nil
+  def heard(%__MODULE__{question: nil}, _message), do: nil
+
+  def heard(%__MODULE__{question: question} = output, message),
+    do:
+      with(
+        answer when answer != nil <- FileWriter.answer(message, question),
+        do: news(output, answer)
+      )
+
+  @doc "Waits for the answer to the question."
+  @spec await(t()) :: news()
+  def await(%__MODULE__{question: question} = output),
+    do: news(output, FileWriter.await(question))
+
+  defp news(output, {:ok, ids, file}) do
+    channels = output.keys |> Enum.zip(ids) |> Map.new()
+    {:open, %{output | channels: channels, file: file, question: nil}}
   end
+
+  defp news(output, {:ok, file}) do
+    turned? = file != output.file
+    said = if turned?, do: nil, else: output.said
+    {:written, %{output | file: file, said: said, question: nil}, turned?}
+  end
+
+  defp news(_output, {:error, _line} = error), do: error
 
   @doc """
-  Writes the entries and the pictures of the last second, at a time in ns since 1970, and puts them on
-  the disk. `turned?` says whether a new file of the folder was begun, which has no states yet.
+  Writes the entries and the pictures of the last second, at a time in ns since 1970, and asks for their being on the
+  disk.
   """
   @spec write(t(), [Replay.entry()], [picture()], Recording.robots(), ns :: non_neg_integer()) ::
-          {:ok, t(), turned? :: boolean()} | {:error, line :: String.t()}
-  def write(%__MODULE__{} = output, entries, pictures, robots, ns) do
+          t()
+  def write(%__MODULE__{question: nil} = output, entries, pictures, robots, ns) do
     {about, trace, _encoding} = Recording.topics()
     {said, topics} = Enum.flat_map_reduce(entries, output.topics, &said(&1, &2, robots))
     shown = Enum.flat_map(pictures, &picture(&1, robots))
@@ -77,15 +105,13 @@ defmodule Robot.Recorder.Output do
           max(ns, at_ns)
       end
 
-    if output.robots != robots, do: message(output, about, ns, Recording.robots(robots))
-    if entries != [], do: message(output, trace, ns, Recording.trace(entries, robots))
+    {bytes, names} = Recording.trace(entries, robots, output.names)
+    now = {robots, names}
+    if output.said != now, do: message(output, about, ns, Recording.robots(robots, names))
+    if entries != [], do: message(output, trace, ns, bytes)
 
-    with :ok <- FileWriter.flush(output.writer),
-         {:ok, file} <- FileWriter.file(output.writer) do
-      turned? = file != output.file
-      known = if turned?, do: %{}, else: robots
-      {:ok, %{output | file: file, robots: known, topics: topics}, turned?}
-    end
+    question = FileWriter.written(output.writer)
+    %{output | names: names, said: now, topics: topics, question: question}
   end
 
   # Nothing is shown of a robot whose clock is not known yet.
@@ -119,10 +145,8 @@ defmodule Robot.Recorder.Output do
 
   @doc "Gives the file up: its disk is full, or hangs."
   @spec abandon(t()) :: :ok
-  def abandon(%__MODULE__{writer: writer}), do: end_writer(writer)
-
   # It may hang in a call to the disk, which nothing ends.
-  defp end_writer(writer) do
+  def abandon(%__MODULE__{writer: writer}) do
     Process.unlink(writer)
     Process.exit(writer, :kill)
     :ok

@@ -26,7 +26,7 @@ defmodule Robot.Recording.File do
 
   @doc """
   Opens a file; `:other` if it is not a recording of robots of processes. The error is one line
-  that names the file. Reading creates no atoms: those that a recording can contain must exist.
+  that names the file. Of atoms only the names that it lists are created (`Robot.Recording.Names`).
   """
   @spec open(Path.t()) :: {:ok, t()} | :other | {:error, line :: String.t()}
   def open(path) do
@@ -55,18 +55,21 @@ defmodule Robot.Recording.File do
     error in Mcap.DamagedError -> {:error, Exception.message(error)}
   end
 
+  # A robot's profile and clock may come later than its name.
   defp robots(reader, topic, path) do
     reader
     |> Mcap.Reader.messages(topics: [topic])
-    |> Enum.reduce_while({:ok, %{}}, fn {_topic, _channel, _ns, bytes}, {:ok, known} ->
-      case Recording.read_robots(bytes) do
-        {:ok, robots} -> {:cont, {:ok, Map.merge(known, robots, fn _id, a, b -> newer(a, b) end)}}
-        {:error, line} -> {:halt, {:error, "#{path} #{line}"}}
-      end
+    |> Enum.reduce_while({:ok, %{}, Recording.Names.most()}, fn
+      {_topic, _channel, _ns, bytes}, {:ok, known, left} ->
+        case Recording.read_robots(bytes, left) do
+          {:ok, robots, left} -> {:cont, {:ok, Map.merge(known, robots, &newer/3), left}}
+          {:error, line} -> {:halt, {:error, "#{path} #{line}"}}
+        end
     end)
+    |> then(fn result -> with {:ok, robots, _left} <- result, do: {:ok, robots} end)
   end
 
-  defp newer(one, other),
+  defp newer(_id, one, other),
     do: Map.merge(one, other, fn _key, a, b -> if(b == nil, do: a, else: b) end)
 
   @doc """

@@ -106,7 +106,7 @@ defmodule Sim.Recording.Topics do
   def tick(topics, writer, {at_ms, bytes, facts}, %Scene{} = scene, pictures \\ []) do
     {_start, ticks, _encoding} = Recording.topics()
     ns = at_ms * 1_000_000
-    news = Enum.drop(scene.stages, topics.told)
+    news = Scene.news(scene.stages, topics.told)
     paths = Drawing.note(topics.paths, scene)
 
     messages =
@@ -123,7 +123,7 @@ defmodule Sim.Recording.Topics do
         Enum.flat_map(pictures, &picture(&1, facts.seen))
 
     {writer, bytes} = write(topics, writer, ns, messages)
-    {%{topics | told: length(scene.stages), paths: paths}, writer, bytes}
+    {%{topics | told: Scene.told(scene.stages), paths: paths}, writer, bytes}
   end
 
   # The picture is the one in which the blobs of this tick were found.

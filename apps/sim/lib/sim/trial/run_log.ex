@@ -7,6 +7,7 @@ defmodule Sim.Trial.RunLog do
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 
   defstruct roles: %{},
+            most: nil,
             stages: [],
             leader: nil,
             epoch: 0,
@@ -31,12 +32,14 @@ defmodule Sim.Trial.RunLog do
         }
 
   @typedoc """
-  `roles` are those of the mission's phases and stages (`c:Robot.Mission.roles/0`); `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
+  `roles` are those of the mission's phases and stages (`c:Robot.Mission.roles/0`); `most` is how many stages, claims, silences and
+  heals are kept (`nil`: all), and then stages have numbers; `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
   radio; `formed_ms` and `rest_ms` say since when the fleet has been in formation, or at rest
   without a landmark; `ticks` and `formed_ticks` count from the first election.
   """
   @type t :: %__MODULE__{
           roles: %{atom() => Robot.Mission.role()},
+          most: pos_integer() | nil,
           stages: [stage()],
           leader: atom() | nil,
           epoch: non_neg_integer(),
@@ -53,9 +56,9 @@ defmodule Sim.Trial.RunLog do
           stuck: Sim.Trial.Stuck.t()
         }
 
-  @doc "An empty run log of a mission."
-  @spec new(module()) :: t()
-  def new(mission), do: %__MODULE__{roles: Robot.Mission.roles(mission)}
+  @doc "An empty run log of a mission; of a run without an end with how much of it is kept."
+  @spec new(module(), most :: pos_integer() | nil) :: t()
+  def new(mission, most \\ nil), do: %__MODULE__{roles: Robot.Mission.roles(mission), most: most}
 
   @doc "Records a stage; a search that others have already begun is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
@@ -67,15 +70,25 @@ defmodule Sim.Trial.RunLog do
         run_log
 
       :searches ->
-        %{run_log | stages: [%{entry | robot: nil} | run_log.stages], searching?: true}
+        %{add(run_log, %{entry | robot: nil}) | searching?: true}
 
       :elects ->
-        %{run_log | stages: [entry | run_log.stages], elections: run_log.elections + 1}
+        %{add(run_log, entry) | elections: run_log.elections + 1}
 
       _other ->
-        %{run_log | stages: [entry | run_log.stages]}
+        add(run_log, entry)
     end
   end
+
+  defp add(%{most: nil} = run_log, entry), do: %{run_log | stages: [entry | run_log.stages]}
+
+  defp add(%{stages: stages} = run_log, entry) do
+    n = if stages == [], do: 1, else: hd(stages).n + 1
+    %{run_log | stages: newest(run_log, [Map.put(entry, :n, n) | stages])}
+  end
+
+  defp newest(%{most: nil}, all), do: all
+  defp newest(%{most: most}, all), do: Enum.take(all, most)
 
   @doc """
   One tick of claims, the parts that the radio is divided into (`nil` if it is whole), and which
@@ -130,14 +143,18 @@ defmodule Sim.Trial.RunLog do
   @spec judge(t(), integer(), [{atom(), map()}], (atom() -> float() | nil)) :: t()
   def judge(run_log, at_ms, claims, worst) do
     leaders = for {id, %{formed: true} = c} <- claims, role(run_log, c) == :leads, do: id
-    %{run_log | claims: Claims.note(run_log.claims, at_ms, leaders, worst)}
+    claims = Claims.note(run_log.claims, at_ms, leaders, worst)
+    %{run_log | claims: %{claims | told: newest(run_log, claims.told)}}
   end
 
   defp role(run_log, claim), do: run_log.roles[claim[:phase]]
 
   @doc "The same tick for the invariant of `Sim.Trial.Stuck`; `rows` is called once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
-  def watch(run_log, at_ms, rows), do: %{run_log | stuck: Stuck.note(run_log.stuck, at_ms, rows)}
+  def watch(run_log, at_ms, rows) do
+    stuck = Stuck.note(run_log.stuck, at_ms, rows)
+    %{run_log | stuck: %{stuck | told: newest(run_log, stuck.told)}}
+  end
 
   @doc "The leader now; among several, the one of the highest epoch."
   @spec leader(t()) :: atom() | nil
