@@ -136,7 +136,8 @@ defmodule Console.ReplayLiveTest do
     {robots_id, writer} = Mcap.Writer.channel(writer, about, encoding, nil)
     {trace_id, writer} = Mcap.Writer.channel(writer, trace, encoding, nil)
     {writer, one} = Mcap.Writer.message(writer, robots_id, 0, robots)
-    {writer, two} = Mcap.Writer.message(writer, trace_id, 0, Recording.trace(entries, %{}))
+    {bytes, _names} = Recording.trace(entries, %{}, MapSet.new())
+    {writer, two} = Mcap.Writer.message(writer, trace_id, 0, bytes)
     File.write!(path, [head, one, two, Mcap.Writer.finish(writer)])
     path
   end
@@ -149,7 +150,7 @@ defmodule Console.ReplayLiveTest do
 
     {gate, _effects} = Robot.Safety.Gate.init(config, %{}, 0)
     drive = {:drive, Hal.Twist.new(0.5, 0.0), []}
-    robots = Recording.robots(%{mag1: %{offset_ms: 0, profile: nil}})
+    robots = Recording.robots(%{mag1: %{offset_ms: 0, profile: nil}}, MapSet.new())
 
     entries = [
       {:mag1, {:gate, :begin, gate, 0}},
@@ -190,12 +191,12 @@ defmodule Console.ReplayLiveTest do
   test "another version, and a file that cannot be made, are refused in one line", %{
     tmp_dir: folder
   } do
-    newer = :erlang.term_to_binary({:convoy_robots, 3, %{}})
+    newer = :erlang.term_to_binary({:convoy_robots, 99, %{}})
     path = written(folder, newer, [])
 
     assert replay(path) ==
              {1, "",
-              "replay: #{path} is a recording of version 3; this program reads version 2\n"}
+              "replay: #{path} is a recording of version 99; this program reads version 3\n"}
 
     options = Runs.options("--headless --hardware 1 --robots 1 --duration 1")
     options = %{options | record: "/proc/none.mcap"}
