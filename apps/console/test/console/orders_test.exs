@@ -1,6 +1,8 @@
 defmodule Console.OrdersTest do
   @moduledoc "What a person orders has an age, and a stop goes past it."
   use ExUnit.Case, async: true
+  # An order may wait for half a second only, of the real clock.
+  @moduletag :realtime
   alias Console.{Orders, Prompt}
   alias Console.Page.Line
 
