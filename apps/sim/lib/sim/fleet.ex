@@ -9,8 +9,10 @@ defmodule Sim.Fleet do
   use GenServer
   alias Hal.{Pose, Ticker}
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
-  alias Sim.Scene
-  alias Sim.Trial.{Evaluation, RunLog, Script, Setup, Termination}
+  alias Sim.{Radio, Scene, World}
+  alias Sim.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
+  alias Swarm.Commands.Client
+  alias Swarm.EStop.Broadcaster
 
   @period_ms 100
   # Of what happens to a fleet that may run for weeks.
@@ -18,7 +20,8 @@ defmodule Sim.Fleet do
 
   @doc """
   Starts a fleet. All options have defaults: `robots`, `seed`, `map`, `landmark`, `formation`,
-  `noise`, `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here);
+  `noise`, `loss` and the others of `Sim.Trial.Setup.new/1` (there is no time limit here); `script` and `cuts` are done to
+  real processes, on one node only;
   `mission: false` for robots that wait for commands instead of starting their mission at once, or
   `mission: {module, options}` for another `Robot.Mission` than the search for the landmark;
   `nodes: true` for robots and world in processes of the operating system of their own; `trace` as
@@ -37,7 +40,7 @@ defmodule Sim.Fleet do
     backend = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
-         :ok <- unscripted(setup.options),
+         :ok <- unscripted(setup.options, backend),
          {:ok, setup, begin?} <-
            Mission.choose(setup, Map.get(own, :mission, true), backend == Nodes),
          :ok <- free(setup.options.robots) do
@@ -56,11 +59,14 @@ defmodule Sim.Fleet do
     end
   end
 
-  # Events such as a freeze are done to real processes by other means (`bin/soak`).
-  defp unscripted(%{script: []}), do: :ok
+  # Processes of their own are frozen, cut off and killed by other means (`bin/soak`).
+  defp unscripted(%{script: [], cuts: []}, _backend), do: :ok
+  defp unscripted(_options, Local), do: :ok
 
-  defp unscripted(_options),
-    do: {:error, "no run in real time can have a script: only one in lockstep carries it out"}
+  defp unscripted(_options, _nodes) do
+    {:error,
+     "robots in processes of their own take no script and no cuts: only those on one node do"}
+  end
 
   @doc "The current scene for viewers."
   @spec scene(GenServer.server()) :: Scene.t()
@@ -69,6 +75,25 @@ defmodule Sim.Fleet do
   @doc "The report of the run so far, without its wall time."
   @spec result(GenServer.server()) :: map()
   def result(fleet), do: GenServer.call(fleet, :result, :infinity)
+
+  @typedoc """
+  A fleet at one moment: the true world, what the living robots claim, the phases of their missions, and the parts of the radio in which robots
+  reach each other.
+  """
+  @type moment :: %{
+          at_ms: non_neg_integer(),
+          options: map(),
+          world: World.t(),
+          run_log: RunLog.t(),
+          claims: [{atom(), map()}],
+          phases: %{atom() => atom()},
+          parts: [[atom()]],
+          faults: Faults.t()
+        }
+
+  @doc "The fleet as it was at its last look, a tenth of a second ago at most, for what judges a run."
+  @spec moment(GenServer.server()) :: moment()
+  def moment(fleet), do: GenServer.call(fleet, :moment, :infinity)
 
   @doc "Kills a robot, or the leader: all its processes at once, as if its power failed."
   @spec kill(GenServer.server(), atom() | :leader) :: :ok | {:error, line :: String.t()}
@@ -129,7 +154,10 @@ defmodule Sim.Fleet do
       setup: setup,
       backend: backend,
       epoch_ms: epoch_ms,
-      script: Script.new(options.moves, options.kills),
+      script: Script.new(options.moves, options.kills, options.script),
+      severed: [],
+      faults: %Faults{},
+      ways: [],
       run_log: RunLog.new(elem(setup.mission, 0), @kept),
       said: [],
       ended: nil,
@@ -139,6 +167,14 @@ defmodule Sim.Fleet do
 
   @impl GenServer
   def handle_call(:scene, _from, s), do: {:reply, s |> run() |> Evaluation.scene(), s}
+
+  def handle_call(:moment, _from, s) do
+    claims = ask(s, :claims)
+    ids = for {id, _claim} <- claims, do: id
+    more = %{claims: claims, phases: phases(claims), parts: parts(s) || [ids], faults: s.faults}
+    {:reply, s |> run() |> Map.delete(:messages) |> Map.merge(more), s}
+  end
+
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
   def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
   def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
@@ -187,11 +223,11 @@ defmodule Sim.Fleet do
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
     {told, said} = Said.look(s.said, claims, s.run_log.roles)
-    run_log = s.run_log |> RunLog.note(now, claims) |> RunLog.judge(now, claims, worst)
+    run_log = s.run_log |> RunLog.note(now, claims, parts(s)) |> RunLog.judge(now, claims, worst)
     run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
     {events, script} = Script.due(s.script, now(s), RunLog.leader(run_log))
     s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
-    {:noreply, schedule(s)}
+    {:noreply, s |> cut(now) |> schedule()}
   end
 
   def handle_info(message, %{backend: {module, backend}} = s) do
@@ -221,14 +257,74 @@ defmodule Sim.Fleet do
   defp list([one]), do: "#{one} lives"
   defp list(robots), do: "#{Enum.join(robots, ", ")} live"
 
-  defp play({:kill, id}, s) do
-    if id in ask(s, :living), do: note({:killed, id}, become(s, :kill, [id])), else: s
+  # Nothing more can happen to a robot that was killed.
+  defp play(event, s) do
+    id = Event.robot(event)
+    if id in [nil, :all] or id in ask(s, :living), do: happen(event, s), else: s
   end
 
-  defp play({:move, place}, s) do
-    stage = if place, do: :landmark_moved, else: :landmark_removed
-    note({:stage, stage, nil, %{}}, become(s, :change, [{:move, place}]))
+  defp happen({:kill, id}, s), do: note({:killed, id}, become(s, :kill, [id]))
+
+  defp happen({:displace, id, {x, y, degrees}} = event, s) do
+    pose = Pose.new(x, y, degrees * :math.pi() / 180)
+
+    if World.Bodies.occupied?(ask(s, :world), id, {x, y}),
+      do: note({:stage, :not_displaced, id, %{}}, s),
+      else: told(event, become(s, :change, [{:displace, id, pose}]))
   end
+
+  defp happen(event, s), do: told(event, change(event, s))
+
+  defp told(event, s) do
+    {stage, robot, facts} = Event.stage(event)
+    note({:stage, stage, robot, facts}, s)
+  end
+
+  defp change({:move, place}, s), do: become(s, :change, [{:move, place}])
+  defp change({:remove_landmark}, s), do: become(s, :change, [{:move, nil}])
+  defp change({:loss, share}, s), do: become(s, :radio, [{:lose, share}])
+  defp change({:cut, what}, s), do: %{s | severed: s.severed ++ [{0, :end, what}]}
+  defp change({:join}, s), do: %{s | severed: []}
+
+  defp change({:tell, to, command}, s),
+    do: order(s, to, Event.request(command, s.setup.options.robots))
+
+  defp change({:estop, id}, s), do: order(s, id, :estop)
+  defp change({:reset}, s), do: order(s, :all, :reset)
+  defp change({kind, _id, _role} = event, s) when kind == :crash, do: become(s, :suffer, [event])
+  defp change({:hang, _id, _role, _for_s} = event, s), do: become(s, :suffer, [event])
+
+  defp change({kind, id, for_s} = event, s) do
+    now = now(s)
+    to_ms = now + round(for_s * 1000)
+    s = %{s | faults: Faults.add(s.faults, Faults.kind(kind), id, now, to_ms)}
+    if kind == :deaf, do: s, else: become(s, :suffer, [event])
+  end
+
+  # A person's order: what the robots answer is for the person.
+  defp order(s, to, request) do
+    robots = if to == :all, do: ask(s, :living), else: [to]
+    if request == :reset, do: Broadcaster.quiet(:all)
+    {:ok, _pid} = Task.start(fn -> Client.ask(robots, request) end)
+    s
+  end
+
+  # What a robot claims says in which phase it is, but for one without a mission.
+  defp phases(claims), do: for({id, claim} <- claims, into: %{}, do: {id, claim[:phase] || :idle})
+
+  # Puts into effect who is cut off from now on.
+  defp cut(%{setup: %{options: options}} = s, now) do
+    ways =
+      Cuts.ways(options.cuts ++ s.severed, options.robots, now) ++
+        Faults.ways(s.faults, options.robots, now)
+
+    if ways == s.ways, do: s, else: become(%{s | ways: ways}, :radio, [{:cut_ways, ways}])
+  end
+
+  defp parts(%{ways: []}), do: nil
+
+  defp parts(s),
+    do: [seed: 0] |> Radio.new() |> Radio.cut_ways(s.ways) |> Radio.parts(ask(s, :living))
 
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 

@@ -31,6 +31,9 @@ defmodule Sim.Invariants do
   @names [:two_leaders, :same_epoch, :two_majorities, :not_together, :no_leader] ++
            [:same_slot, :bad_anchor, :too_fast, :too_abrupt, :stop_ignored, :stop_lost] ++
            [:collision, :stuck, :false_claim, :crash]
+  # What a fleet of processes shows as well.
+  @live [:two_leaders, :same_epoch, :two_majorities, :not_together, :no_leader] ++
+          [:collision, :stuck, :false_claim]
   @goal 0.99
 
   @enforce_keys [:leaders, :slots, :stops, :withdrawals]
@@ -51,13 +54,17 @@ defmodule Sim.Invariants do
   @spec names() :: [atom(), ...]
   def names, do: @names
 
+  @doc "Those that `watch/2` judges."
+  @spec live() :: [atom(), ...]
+  def live, do: @live
+
   @doc "The share of the claims of many runs that must be true."
   @spec goal() :: float()
   def goal, do: @goal
 
-  @doc "The judge at the beginning of a trial."
-  @spec new(Trial.t()) :: t()
-  def new(%Trial{options: options}) do
+  @doc "The judge at the beginning of a trial, or of a fleet of processes."
+  @spec new(%{:options => map(), optional(atom()) => term()}) :: t()
+  def new(%{options: options}) do
     %__MODULE__{
       leaders: Leaders.new(options),
       slots: Slots.new(options),
@@ -116,6 +123,21 @@ defmodule Sim.Invariants do
     {touched, judge} = contacts(judge, world)
     {silent, judge} = silences(judge, trial)
     tell(judge, led ++ placed ++ driven ++ stopped ++ touched ++ silent)
+  end
+
+  @doc """
+  One look at a fleet of processes, ten times a second (`Sim.Fleet.moment/1`): of the invariants those of `live/0`. Where its robots
+  agree on places, and how their wheels turn, is inside processes, or between two looks.
+  """
+  @spec watch(t(), Sim.Fleet.moment()) :: t()
+  def watch(judge, %{at_ms: at_ms, claims: claims, faults: faults} = moment) do
+    frozen? = &Faults.any?(faults, [:frozen], &1, at_ms - 1)
+    claims = for {id, _claim} = row <- claims, not frozen?.(id), do: row
+    {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, moment.parts)
+    withdrawals = Withdrawals.note(judge.withdrawals, at_ms, claims)
+    {touched, judge} = contacts(judge, moment.world)
+    {silent, judge} = silences(judge, moment)
+    tell(%{judge | leaders: leaders, withdrawals: withdrawals}, led ++ touched ++ silent)
   end
 
   @doc "The end of the run, with its report (`Sim.Trial.result/1`): its claims can be judged now."

@@ -5,9 +5,14 @@ defmodule Console.Scenario.Options do
   alias Console.Cli.{Arguments, Parse}
 
   @enforce_keys [:files]
-  defstruct @enforce_keys ++ [quiet: false, record: nil]
+  defstruct @enforce_keys ++ [quiet: false, record: nil, live: false]
 
-  @type t :: %__MODULE__{files: [Path.t(), ...], quiet: boolean(), record: Path.t() | nil}
+  @type t :: %__MODULE__{
+          files: [Path.t(), ...],
+          quiet: boolean(),
+          record: Path.t() | nil,
+          live: boolean()
+        }
 
   @doc """
   Options from a command's arguments, or one line for each error. Names of files are relative to
@@ -26,16 +31,26 @@ defmodule Console.Scenario.Options do
 
     with {:ok, given} <- Arguments.parse(options, table(folder)) do
       cond do
-        {"help", true} in given -> :help
-        files == [] -> {:error, ["a file is missing: mix scenario FILE..."]}
-        true -> {:ok, new(files(files, folder), given, folder)}
+        {"help", true} in given ->
+          :help
+
+        files == [] ->
+          {:error, ["a file is missing: mix scenario FILE..."]}
+
+        {"live", true} in given and List.keymember?(given, "record", 0) ->
+          {:error, ["--live cannot be used with --record: only runs in lockstep are recorded"]}
+
+        true ->
+          {:ok, new(files(files, folder), given, folder)}
       end
     end
   end
 
   defp new(files, given, folder) do
     {"record", record} = List.keyfind(given, "record", 0, {"record", folder})
-    %__MODULE__{files: files, quiet: {"quiet", true} in given, record: record}
+    live? = {"live", true} in given
+    record = unless live?, do: record
+    %__MODULE__{files: files, quiet: {"quiet", true} in given, record: record, live: live?}
   end
 
   defp files(files, "."), do: files
@@ -45,6 +60,8 @@ defmodule Console.Scenario.Options do
     [
       {"record", "DIR", &Parse.folder(&1, folder),
        "where the runs that fail are recorded, for mix replay (here)"},
+      {"live", nil, nil,
+       "in real time on processes, as robots run, one file after the other; not recorded"},
       {"quiet", nil, nil, "print only what failed, and the last line"}
     ]
   end
@@ -63,6 +80,7 @@ defmodule Console.Scenario.Options do
       mix scenario test/scenarios/kill_leader.exs   its stages, and a line for each expectation
       mix scenario test/scenarios/*.exs             all of them, side by side
       mix scenario --quiet test/scenarios/*.exs     only what failed
+      mix scenario --live mine.exs                  the same on robots of processes, in real time
 
     docs/scenarios.md shows how to write one, with all events and expectations.
 

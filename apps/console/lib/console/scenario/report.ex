@@ -3,10 +3,11 @@ defmodule Console.Scenario.Report do
   alias Console.Cli.Format
   alias Console.Fleet
   alias Sim.Scenario
-  alias Sim.Scenario.{Runner, Text}
+  alias Sim.Scenario.{Check, Text}
 
   @doc "The first lines: the file, what it is for, and the robots."
-  @spec heading(Path.t(), Scenario.t(), Sim.Trial.t()) :: [String.t()]
+  @spec heading(Path.t(), Scenario.t(), %{:options => map(), optional(atom()) => term()}) ::
+          [String.t()]
   def heading(file, scenario, %{options: options}) do
     robots = Format.count(length(options.robots), "robot")
     about = if scenario.about == "", do: "", else: ": " <> scenario.about
@@ -18,7 +19,7 @@ defmodule Console.Scenario.Report do
   end
 
   @doc "One line for each expectation."
-  @spec verdicts([Runner.verdict()]) :: [String.t()]
+  @spec verdicts([Check.verdict()]) :: [String.t()]
   def verdicts(verdicts), do: Enum.map(verdicts, &verdict/1)
 
   @doc """
@@ -27,10 +28,10 @@ defmodule Console.Scenario.Report do
       iex> Console.Scenario.Report.verdict(%{expectation: {:formed, [by_s: 60.0]}, held?: false, at_s: 60.0, figures: "nobody leads"})
       "   60.0 s  FAILED  {:formed, by_s: 60}: nobody leads"
   """
-  @spec verdict(Runner.verdict()) :: String.t()
+  @spec verdict(Check.verdict()) :: String.t()
   def verdict(verdict) do
     at_s = verdict.at_s |> Format.decimals(1) |> String.pad_leading(7)
-    word = if verdict.held?, do: "held  ", else: "FAILED"
+    word = %{true: "held  ", false: "FAILED", nil: "?     "}[verdict.held?]
     "#{at_s} s  #{word}  #{Text.form(verdict.expectation)}: #{verdict.figures}"
   end
 
@@ -39,17 +40,27 @@ defmodule Console.Scenario.Report do
 
       iex> Console.Scenario.Report.summary("a.exs", 61.25, [%{held?: true}, %{held?: false}])
       "a.exs: 1 of 2 expectations failed, after 61.3 s"
+      iex> Console.Scenario.Report.summary("a.exs", 61.25, [%{held?: true}, %{held?: nil}])
+      "a.exs: 2 expectations held but for 1 that nothing looked at, after 61.3 s"
   """
-  @spec summary(Path.t(), float(), [%{:held? => boolean(), optional(atom()) => term()}]) ::
+  @spec summary(Path.t(), float(), [%{:held? => boolean() | nil, optional(atom()) => term()}]) ::
           String.t()
   def summary(file, at_s, verdicts) do
     count = length(verdicts)
     seconds = Format.decimals(at_s, 1)
 
-    case Enum.count(verdicts, &(not &1.held?)) do
-      _any when count == 0 -> "#{file}: nothing was expected, after #{seconds} s"
-      0 -> "#{file}: #{expectations(count)} held, after #{seconds} s"
-      failed -> "#{file}: #{failed} of #{expectations(count)} failed, after #{seconds} s"
+    case {Enum.count(verdicts, &(&1.held? == false)), Enum.count(verdicts, &(&1.held? == nil))} do
+      _any when count == 0 ->
+        "#{file}: nothing was expected, after #{seconds} s"
+
+      {0, 0} ->
+        "#{file}: #{expectations(count)} held, after #{seconds} s"
+
+      {0, unknown} ->
+        "#{file}: #{expectations(count)} held but for #{unknown} that nothing looked at, after #{seconds} s"
+
+      {failed, _unknown} ->
+        "#{file}: #{failed} of #{expectations(count)} failed, after #{seconds} s"
     end
   end
 

@@ -1,11 +1,12 @@
 defmodule Console.Scenario.Session do
   @moduledoc false
   # Runs the files of `mix scenario`: one with its stages as they happen, several side by side, each
-  # printed as a whole in the order of the arguments.
+  # printed as a whole in the order of the arguments; in real time one after the other.
   alias Console.Cli.{Format, Output}
   alias Console.Scenario.{Options, Recording, Report}
-  alias Sim.{Scenario, Trial}
+  alias Sim.{Scenario, Scene, Trial}
   alias Sim.Scenario.Runner
+  alias Sim.Trial.RunLog
 
   @doc """
   Reads all files before the first run. The status is 0 if all expectations hold, else 2; an error
@@ -59,6 +60,16 @@ defmodule Console.Scenario.Session do
          do: {:error, ["#{file}: #{line}"]}
   end
 
+  defp play(runs, %{live: true} = options) do
+    {:ok, _apps} = Application.ensure_all_started(:swarm)
+    failed = Enum.flat_map(runs, &in_real_time(&1, options))
+
+    if length(runs) > 1,
+      do: IO.puts(Report.total(length(runs), Enum.map(failed, &elem(&1, 0))))
+
+    failed
+  end
+
   defp play([{file, run}], options) do
     Sim.Trial.Memory.prepare()
     output = Output.to(:stdio)
@@ -96,6 +107,32 @@ defmodule Console.Scenario.Session do
     failed
   end
 
+  defp in_real_time({file, %{scenario: scenario, trial: trial}}, options) do
+    output = Output.to(:stdio)
+    unless options.quiet, do: tell(Report.heading(file, scenario, trial), output)
+    now_ms = Hal.Clock.now_ms()
+    view = %{output: output, quiet: options.quiet, told: 0, drawn_ms: now_ms}
+
+    shown = fn %{at_ms: at_ms, run_log: log}, checks, view ->
+      view
+      |> news(RunLog.stages(log))
+      |> draw(at_ms / 1000, Scenario.duration_s(scenario), checks)
+    end
+
+    ended = Scenario.Live.run(scenario, view, shown)
+    Output.finish(output)
+
+    case ended do
+      {:ok, _result, at_s, verdicts} ->
+        tell(shown(verdicts, options) ++ [Report.summary(file, at_s, verdicts)], output)
+        failed(file, verdicts)
+
+      {:error, line} ->
+        tell(["#{file}: #{line}"], output)
+        [{file, 0.0}]
+    end
+  end
+
   # A run that is over is large: only what is printed of it comes back from its process.
   defp whole({file, run}) do
     Sim.Trial.Memory.prepare()
@@ -110,23 +147,22 @@ defmodule Console.Scenario.Session do
   defp finish(run), do: if(Runner.done?(run), do: run, else: run |> Runner.step() |> finish())
 
   defp live(run, view) do
-    view = view |> news(run) |> draw(run)
+    at_s = run.trial.at_ms / 1000
+    view = view |> news(stages(run)) |> draw(at_s, Scenario.duration_s(run.scenario), run.checks)
     if Runner.done?(run), do: run, else: run |> Runner.step() |> live(view)
   end
 
-  defp news(%{quiet: true} = view, _run), do: view
+  defp news(%{quiet: true} = view, _stages), do: view
 
-  defp news(view, run) do
-    new = Enum.drop(stages(run), view.told)
-    tell(Enum.map(new, &Format.stage/1), view.output)
-    %{view | told: view.told + length(new)}
+  defp news(view, stages) do
+    tell(stages |> Scene.news(view.told) |> Enum.map(&Format.stage/1), view.output)
+    %{view | told: Scene.told(stages)}
   end
 
-  defp draw(view, run) do
+  defp draw(view, at_s, duration_s, checks) do
     Output.redraw(view, fn ->
-      open = Enum.count(run.checks, &(&1.status in [:open, :holding]))
-      note = "#{open} of #{length(run.checks)} expectations undecided"
-      {at_s(run), Scenario.duration_s(run.scenario), note}
+      open = Enum.count(checks, &(&1.status in [:open, :holding]))
+      {at_s, duration_s, "#{open} of #{length(checks)} expectations undecided"}
     end)
   end
 
@@ -142,10 +178,10 @@ defmodule Console.Scenario.Session do
   defp stages(run), do: Trial.scene(run.trial).stages
   defp at_s(run), do: run.trial.at_ms / 1000
   defp summary(file, run, verdicts), do: Report.summary(file, at_s(run), verdicts)
-  defp held?(verdicts), do: Enum.all?(verdicts, & &1.held?)
+  defp held?(verdicts), do: not Enum.any?(verdicts, &(&1.held? == false))
 
   defp shown(verdicts, %{quiet: true}),
-    do: verdicts |> Enum.reject(& &1.held?) |> Report.verdicts()
+    do: verdicts |> Enum.filter(&(&1.held? == false)) |> Report.verdicts()
 
   defp shown(verdicts, _options), do: Report.verdicts(verdicts)
   # When the first expectation failed.

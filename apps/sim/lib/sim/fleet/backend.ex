@@ -30,6 +30,13 @@ defmodule Sim.Fleet.Backend do
   @doc "Kills a living robot at once."
   @callback kill(backend(), atom()) :: backend()
 
+  @doc "Carries out an event of a script (`Sim.Trial.Event`) that only its processes can, on a living robot."
+  @callback suffer(backend(), Sim.Trial.Event.t()) :: backend()
+
+  @doc "Cuts exactly these ways of the radio, or loses this share of all messages, from now on."
+  @callback radio(backend(), {:cut_ways, [{atom(), atom()}]} | {:lose, number()}) :: backend()
+  @optional_callbacks suffer: 2, radio: 2
+
   @doc "Changes the world."
   @callback change(backend(), World.Server.change()) :: backend()
 

@@ -5,17 +5,19 @@ defmodule Sim.Fleet.Local do
       supervisor (one_for_all, no restarts: a fleet cannot exist without its world)
       |-- Sim.World.Directory     unless another fleet of this node has it already
       |-- Sim.World.Server     the world
-      |-- Sim.Fleet.RadioServer  a radio that loses, if any is lost
+      |-- Sim.Fleet.RadioServer  a radio that loses, if any may be lost
       |-- Sim.Fleet.Hardware  emulated devices of those that have the real drivers, if any has
       `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
   """
   @behaviour Sim.Fleet.Backend
+  alias Elixir.Robot.Names
   alias Hal.Event
   alias Sim.Fleet.{Folder, Hardware, RadioServer, Robot}
   alias Sim.World
 
   @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
-  defstruct @enforce_keys
+  # `holders` keep processes of frozen robots from going on.
+  defstruct @enforce_keys ++ [holders: []]
 
   @impl Sim.Fleet.Backend
   def start(setup, options) do
@@ -96,6 +98,46 @@ defmodule Sim.Fleet.Local do
   end
 
   @impl Sim.Fleet.Backend
+  def suffer(backend, {:crash, id, role}) do
+    with pid when pid != nil <- Names.whereis(id, role), do: Process.exit(pid, :kill)
+    backend
+  end
+
+  def suffer(backend, {:hang, id, role, for_s}), do: suspend(backend, id, [role], for_s)
+  def suffer(backend, {:blind, id, for_s}), do: suspend(backend, id, [:camera], for_s)
+
+  # Its recorder may be that of others, too.
+  def suffer(backend, {:freeze, id, for_s}),
+    do: suspend(backend, id, List.delete(Names.roles(id), :recorder), for_s)
+
+  # They get no processor, as if the system had none for them. They go on when the process that holds them ends, with the fleet
+  # at the latest.
+  defp suspend(backend, id, roles, for_s) do
+    pids = for role <- roles, pid = Names.whereis(id, role), do: pid
+
+    holder =
+      spawn_link(fn ->
+        Enum.each(pids, &held/1)
+        receive(do: (:never -> :ok), after: (round(for_s * 1000) -> :ok))
+      end)
+
+    %{backend | holders: [holder | Enum.filter(backend.holders, &Process.alive?/1)]}
+  end
+
+  defp held(pid) do
+    :erlang.suspend_process(pid)
+  rescue
+    # It has ended.
+    ArgumentError -> true
+  end
+
+  @impl Sim.Fleet.Backend
+  def radio(backend, change) do
+    RadioServer.change(backend.air, change)
+    backend
+  end
+
+  @impl Sim.Fleet.Backend
   def change(backend, change) do
     :ok = World.Server.change(backend.server, change)
     backend
@@ -133,6 +175,8 @@ defmodule Sim.Fleet.Local do
   @impl Sim.Fleet.Backend
   def stop(backend) do
     Event.detach({__MODULE__, self()})
+    # What is frozen cannot end in order.
+    Enum.each(backend.holders, &Process.exit(&1, :kill))
     if Process.alive?(backend.supervisor), do: Supervisor.stop(backend.supervisor, :shutdown)
     if backend.folder, do: Folder.remove(backend.folder)
   end
@@ -151,7 +195,7 @@ defmodule Sim.Fleet.Local do
 
     worlds ++
       server ++
-      RadioServer.parts(options.loss, options.seed) ++
+      RadioServer.parts(options.loss, options.seed, options.script ++ options.cuts != []) ++
       Hardware.parts(robots, name, folder) ++ [Elixir.Robot.Fleet]
   end
 

@@ -14,13 +14,16 @@ defmodule Sim.Fleet.RadioServer do
   @type counter :: :counters.counters_ref()
 
   @doc """
-  The part of a fleet's supervision tree that loses `loss` of all messages; none if none is lost.
+  The part of a fleet's supervision tree that loses `loss` of all messages, or what a script and cuts say (`changes?`); none if none can
+  be lost.
   """
-  @spec parts(number(), integer()) :: [Supervisor.child_spec()]
-  def parts(loss, seed) when loss > 0,
+  @spec parts(number(), integer(), changes? :: boolean()) :: [Supervisor.child_spec()]
+  def parts(loss, seed, changes? \\ false)
+
+  def parts(loss, seed, changes?) when loss > 0 or changes?,
     do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [[seed: seed, loss: loss]]}}]
 
-  def parts(_no_loss, _seed), do: []
+  def parts(_no_loss, _seed, _changes?), do: []
 
   @doc """
   The transport of that part, or without it the one that loses nothing, and the counter of its
@@ -60,6 +63,10 @@ defmodule Sim.Fleet.RadioServer do
   defp addressed(from, :all), do: List.delete(Transport.robots(), from)
   defp addressed(_from, ids), do: ids
 
+  @doc "Cuts exactly these ways from now on (`Sim.Radio.cut_ways/2`), or loses this share."
+  @spec change(pid(), {:cut_ways, [{atom(), atom()}]} | {:lose, number()}) :: :ok
+  def change(air, change), do: GenServer.cast(air, {:change, change})
+
   @doc "How many messages were sent and lost so far, by either radio."
   @spec counts(pid() | counter()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
   def counts(air) when is_pid(air), do: GenServer.call(air, :counts)
@@ -71,6 +78,12 @@ defmodule Sim.Fleet.RadioServer do
   @impl GenServer
   def handle_cast({:transmit, from, to, message}, s),
     do: {:noreply, poll(%{s | radio: Radio.send(s.radio, Hal.Clock.now_ms(), from, to, message)})}
+
+  def handle_cast({:change, {:cut_ways, ways}}, s),
+    do: {:noreply, %{s | radio: Radio.cut_ways(s.radio, ways)}}
+
+  def handle_cast({:change, {:lose, share}}, s),
+    do: {:noreply, %{s | radio: Radio.lose(s.radio, share)}}
 
   @impl GenServer
   def handle_call(:counts, _from, s), do: {:reply, Map.take(s.radio, [:sent, :lost]), s}

@@ -7,7 +7,7 @@ defmodule Sim.Scenario.Runner do
   A run that raises does so here, too, but where a scenario expects that it does not: then it ends.
   """
   alias Sim.{Invariants, Scenario, Trial}
-  alias Sim.Scenario.{Check, Expectation, View}
+  alias Sim.Scenario.{Check, View}
 
   @enforce_keys [:scenario, :trial, :judge, :checks]
   defstruct @enforce_keys
@@ -17,14 +17,6 @@ defmodule Sim.Scenario.Runner do
           trial: Trial.t(),
           judge: Invariants.t(),
           checks: [Check.t()]
-        }
-
-  @typedoc "Whether an expectation held, when that was decided, and the figures."
-  @type verdict :: %{
-          expectation: Expectation.t(),
-          held?: boolean(),
-          at_s: float(),
-          figures: String.t()
         }
 
   @doc "A run at its beginning; the error is one line."
@@ -50,7 +42,8 @@ defmodule Sim.Scenario.Runner do
   @spec step(t()) :: t()
   def step(%__MODULE__{} = run) do
     {trial, judge} = advance(run)
-    checks = Enum.map(run.checks, &Check.tick(&1, trial, judge))
+    view = View.of(trial)
+    checks = Enum.map(run.checks, &Check.tick(&1, view, judge))
     %{run | trial: trial, judge: judge, checks: checks}
   end
 
@@ -69,15 +62,21 @@ defmodule Sim.Scenario.Runner do
   @doc "Whether the run is over."
   @spec done?(t()) :: boolean()
   def done?(%__MODULE__{trial: trial, checks: checks} = run) do
-    at_s = View.at_s(trial)
+    Invariants.violated?(run.judge, :crash) or
+      over?(run.scenario, checks, trial.at_ms / 1000, fn -> Trial.done?(trial) end)
+  end
+
+  @doc "Whether a run is over at this second, by its checks; `done?` says whether its fleet has nothing left to do."
+  @spec over?(Scenario.t(), [Check.t()], at_s :: number(), done? :: (... -> boolean())) ::
+          boolean()
+  def over?(scenario, checks, at_s, done?) do
     left = Enum.filter(checks, &(&1.status in [:open, :holding]))
 
     cond do
-      at_s >= Scenario.duration_s(run.scenario) -> true
-      Invariants.violated?(run.judge, :crash) -> true
+      at_s >= Scenario.duration_s(scenario) -> true
       checks != [] and left == [] -> true
       Enum.any?(left, &wanted?(&1, at_s)) -> false
-      true -> Trial.done?(trial)
+      true -> done?.()
     end
   end
 
@@ -86,14 +85,11 @@ defmodule Sim.Scenario.Runner do
   defp wanted?(_until_a_time, _at_s), do: true
 
   @doc "The verdicts if the run ended now, in the order of the expectations."
-  @spec verdicts(t()) :: [verdict()]
+  @spec verdicts(t()) :: [Check.verdict()]
   def verdicts(%__MODULE__{trial: trial, checks: checks} = run) do
     judge = Invariants.finish(run.judge, Trial.result(trial))
 
-    for check <- checks do
-      %Check{status: {word, at_s, figures}} = Check.finish(check, trial, judge)
-      %{expectation: check.expectation, held?: word == :held, at_s: at_s, figures: figures}
-    end
+    for check <- checks, do: Check.verdict(check, trial.at_ms / 1000, judge)
   end
 
   @doc """
@@ -104,7 +100,8 @@ defmodule Sim.Scenario.Runner do
       iex> {result.simulated_s, safe.held?, formed.held?, formed.at_s, formed.figures}
       {1.0, true, false, 0.5, "not in formation: nobody leads; mag1 search"}
   """
-  @spec run(Scenario.t()) :: {:ok, result :: map(), [verdict()]} | {:error, line :: String.t()}
+  @spec run(Scenario.t()) ::
+          {:ok, result :: map(), [Check.verdict()]} | {:error, line :: String.t()}
   def run(%Scenario{} = scenario) do
     with {:ok, run} <- new(scenario) do
       run = finish(run)

@@ -200,6 +200,40 @@ defmodule Sim.Trial.Event do
   def robot({:hang, who, _role, _for_s}), do: who
   def robot(_event), do: nil
 
+  @doc """
+  The stage that tells of an event: its name, the robot, and facts.
+
+      iex> for event <- [{:kill, :mag1}, {:tell, :all, :stop}, {:blind, :mag2, 3.0}], do: Sim.Trial.Event.stage(event)
+      [{:killed, :mag1, %{}}, {:told, nil, %{command: :stop}}, {:blind, :mag2, %{for_s: 3.0}}]
+  """
+  @spec stage(t()) :: {name :: atom(), robot :: atom() | nil, facts :: map()}
+  def stage({:kill, id}), do: {:killed, id, %{}}
+  def stage({:move, nil}), do: {:landmark_removed, nil, %{}}
+  def stage({:move, _place}), do: {:landmark_moved, nil, %{}}
+  def stage({:remove_landmark}), do: {:landmark_removed, nil, %{}}
+  def stage({:tell, :all, command}), do: {:told, nil, %{command: command}}
+  def stage({:tell, id, command}), do: {:told, id, %{command: command}}
+  def stage({:estop, id}), do: {:estop, id, %{}}
+  def stage({:reset}), do: {:reset, nil, %{}}
+  def stage({:cut, _what}), do: {:radio_cut, nil, %{}}
+  def stage({:join}), do: {:radio_whole, nil, %{}}
+  def stage({:loss, share}), do: {:radio_loss, nil, %{share: share}}
+  def stage({:displace, id, _pose}), do: {:displaced, id, %{}}
+  def stage({:crash, id, role}), do: {:crashed, id, %{crash: "its #{role}, by the script"}}
+  def stage({:hang, id, role, for_s}), do: {:hangs, id, %{role: role, for_s: for_s}}
+  def stage({:freeze, id, for_s}), do: {:frozen, id, %{for_s: for_s}}
+  def stage({kind, id, for_s}) when kind in [:blind, :deaf], do: {kind, id, %{for_s: for_s}}
+
+  @doc "What robots are told by the command of an event, which was read for a run with these robots."
+  @spec request(command :: term(), [atom()]) :: term()
+  def request("" <> text, robots) do
+    {:ok, command} = Command.parse(text, robots)
+    {:ok, request} = Swarm.Missions.Text.request(command, length(robots))
+    request
+  end
+
+  def request(command, _robots), do: command
+
   @doc "The event with the leader's name for `:leader`."
   @spec name(t(), leader :: atom() | nil) :: t()
   def name(event, leader),

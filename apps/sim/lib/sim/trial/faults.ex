@@ -13,6 +13,11 @@ defmodule Sim.Trial.Faults do
           all: [{kind(), robot :: atom(), from_ms :: integer(), to_ms :: integer()}]
         }
 
+  @doc "The fault that an event of this name brings."
+  @spec kind(event :: :freeze | :blind | :deaf) :: kind()
+  def kind(:freeze), do: :frozen
+  def kind(kind) when kind in [:blind, :deaf], do: kind
+
   @doc "Adds a fault."
   @spec add(t(), kind(), atom(), integer(), integer()) :: t()
   def add(faults, kind, robot, from_ms, to_ms),

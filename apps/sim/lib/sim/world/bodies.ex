@@ -24,4 +24,15 @@ defmodule Sim.World.Bodies do
   @spec pole(Sim.World.t()) :: [Contact.disc()]
   def pole(%{landmark: nil}), do: []
   def pole(%{landmark: {x, y}}), do: [{x, y, @landmark_radius}]
+
+  @doc "Whether a robot's body would touch another one, or the landmark, at this place. A wall is refused before the run."
+  @spec occupied?(Sim.World.t(), atom(), Hal.Pose.point()) :: boolean()
+  def occupied?(world, id, {x, y}) do
+    radius = world.robots[id].profile.radius
+    others = for(body <- all(world), body.id != id, do: disc(body)) ++ pole(world)
+
+    Enum.any?(others, fn {ox, oy, other} ->
+      Hal.Pose.distance({x, y}, {ox, oy}) < radius + other
+    end)
+  end
 end

@@ -110,7 +110,10 @@ defmodule Sim.Scenario.RunnerTest do
     robots = [:mag1, :mag2, :min1]
 
     parts = fn script, at_s ->
-      stepped([robots: robots], script, at_s) |> View.leaders() |> Enum.map(&elem(&1, 0))
+      stepped([robots: robots], script, at_s)
+      |> View.of()
+      |> View.leaders()
+      |> Enum.map(&elem(&1, 0))
     end
 
     cut = [{1, {:cut, [[:mag1], [:mag2, :min1]]}}]
@@ -161,10 +164,5 @@ defmodule Sim.Scenario.RunnerTest do
     end
 
     assert :erlang.term_to_binary(run.()) == :erlang.term_to_binary(run.())
-  end
-
-  test "a fleet in real time has no script" do
-    assert {:error, line} = Sim.Fleet.start_link(robots: [:mag91], script: [{1, {:reset}}])
-    assert line =~ "no run in real time can have a script"
   end
 end

@@ -1,0 +1,40 @@
+defmodule Sim.Scenario.LiveTest do
+  @moduledoc "A scenario on robots of processes, in real time."
+  use ExUnit.Case, async: false
+  alias Sim.Scenario
+  @moduletag :realtime
+  @moduletag :capture_log
+
+  test "its events happen, and what it expects is judged by what was looked at" do
+    {:ok, scenario} =
+      Scenario.new(
+        options: [robots: [:mag68, :mag69], blobs: :direct, duration_s: 5],
+        script: [{1, {:tell, :mag69, "square:1"}}, {2, {:freeze, :mag69, 2}}],
+        expect: [
+          {:phase, :mag68, :search, by_s: 2},
+          {:still, :mag69, from_s: 3.5, to_s: 3.9},
+          {:moves, :mag69, by_s: 2},
+          {:formed, by_s: 0.5},
+          {:never, :collision},
+          {:never, :too_fast}
+        ]
+      )
+
+    shown = fn moment, checks, seen -> [{moment.at_ms, length(checks)} | seen] end
+    assert {:ok, result, at_s, verdicts} = Scenario.Live.run(scenario, [], shown)
+    assert at_s >= 5.0
+    stages = for stage <- result.stages, do: {stage.stage, stage.robot}
+    assert {:told, :mag69} in stages and {:frozen, :mag69} in stages
+
+    assert [true, true, true, false, true, nil] == Enum.map(verdicts, & &1.held?),
+           inspect(verdicts)
+
+    assert List.last(verdicts).figures == "only a run in lockstep is judged by this"
+  end
+
+  test "what cannot start is one line" do
+    {:ok, scenario} = Scenario.new(options: [robots: 1, map: "nowhere.png"])
+    assert {:error, line} = Scenario.Live.run(scenario)
+    assert line =~ "nowhere.png"
+  end
+end
