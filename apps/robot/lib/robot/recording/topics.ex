@@ -182,14 +182,16 @@ defmodule Robot.Recording.Topics do
   defp goal_pose(_other), do: nil
 
   defp message(from, to, message),
-    do: Json.encode!({:object, [from: from, to: to, kind: kind(message)]})
+    do: Json.encode!({:object, [from: from, to: to, kind: "#{kind(message) || "?"}"]})
 
   defp sender(%{from: from}) when is_atom(from), do: "#{from}"
   defp sender(_other), do: "?"
 
-  defp kind(%{kind: kind}) when is_atom(kind), do: "#{kind}"
-  defp kind(%Robot.Mission.Claim{}), do: "claim"
-  defp kind(_other), do: "?"
+  @doc "What kind of message a mission has sent, as far as it is known."
+  @spec kind(struct()) :: atom() | nil
+  def kind(%{kind: kind}) when is_atom(kind), do: kind
+  def kind(%Robot.Mission.Claim{}), do: :claim
+  def kind(_other), do: nil
 
   defp claim(%{claimed_ms: claimed_ms} = robot, _id, _claim, at_ms)
        when claimed_ms != nil and at_ms - claimed_ms < @claim_ms,
