@@ -8,7 +8,7 @@ defmodule Console.Demo do
   alias Hal.Pose
   alias Robot.Navigation.MapFile
   alias Sim.{Recorder, Scene, Trial}
-  alias Sim.Recording.Pictures
+  alias Sim.Recording.{Facts, Pictures}
   alias Sim.Trial.Coverage
 
   @progress_ms 100
@@ -236,7 +236,7 @@ defmodule Console.Demo do
       :ok = Recorder.tick(run.recorder, {scene.at_ms, entries}, scene, frames)
     end
 
-    {trial, %{run | tables: run.tables && Tables.tick(run.tables, entries, scene)}}
+    {trial, %{run | tables: run.tables && Tables.tick(run.tables, Facts.of(entries), scene)}}
   end
 
   defp tell(run, scene) do

@@ -1,13 +1,14 @@
 defmodule Console.Replay do
   @moduledoc """
-  Replays a recorded run for people: prints its stages, says whether every decision and every
-  reading is as recorded, how the fleet stood at a time (`.Moment`), compares two recordings, and goes through one tick by
-  tick (`.Session`).
+  Replays a recording for people, of a run in lockstep or of robots of processes (`.Recording`): prints its stages, says whether
+  every decision is as recorded (`.Verdict`), how the fleet stood at a time (`.Moment`), compares two recordings, and goes
+  through one tick by tick (`.Session`).
   """
   alias Console.Cli.{Format, Output}
-  alias Console.Replay.{Asked, Difference, Guard, Live, Moment, Options, Session}
+  alias Console.Replay.{Asked, Difference, Guard, Moment, Options, Recording, Session, Verdict}
   alias Console.Tables
-  alias Sim.{Recording, Replay, Trial}
+  alias Sim.Recording.Comparison
+  alias Sim.Replay.Kind
 
   # So many differences are shown; the first ones explain the others.
   @shown 3
@@ -24,29 +25,19 @@ defmodule Console.Replay do
   end
 
   defp read(options) do
-    with :other <- Live.run(options),
-         {:ok, file} <- Recording.File.open(options.file),
-         :ok <- asked(options, file),
-         {:ok, status} <- follow(file, options) do
-      status
-    else
-      {:live, status} -> status
-      {:error, line} -> {:error, line}
-    end
+    with {:ok, recording} <- Recording.open(options.file),
+         names = Recording.names(recording),
+         :ok <- Asked.check(options, names, Recording.last_ms(recording) / 1000),
+         do: follow(recording, options)
   end
 
-  defp asked(options, file) do
-    names = for robot <- file.setup.robots, do: Atom.to_string(robot.id)
-    Asked.check(options, names, ["leader" | names], Recording.File.last_ms(file) / 1000)
+  defp follow(recording, %{step: true} = options) do
+    IO.puts(Recording.heading(recording))
+    Session.run(options, recording)
   end
 
-  defp follow(file, %{step: true} = options) do
-    IO.puts(heading(file))
-    {:ok, Session.run(options, file)}
-  end
-
-  defp follow(file, %{against: nil} = options), do: replay(file, options)
-  defp follow(file, options), do: against(file, options)
+  defp follow(recording, %{against: nil} = options), do: replay(recording, options)
+  defp follow(recording, options), do: against(recording, options)
 
   defp refuse(line) do
     IO.puts(:stderr, "replay: #{line}")
@@ -54,23 +45,24 @@ defmodule Console.Replay do
   end
 
   defp against(one, options) do
-    with {:ok, other} <- Recording.File.open(options.against) do
-      if one.setup == other.setup do
-        {:ok, told(Recording.Comparison.first(ticks(one), ticks(other)))}
+    with {:ok, other} <- Recording.open(options.against),
+         :ok <- Recording.alike(one, other) do
+      if one.begin == other.begin do
+        told(Comparison.first(Recording.comparable(one), Recording.comparable(other)))
       else
-        IO.puts("The two begin differently: #{Difference.setups(one.setup, other.setup)}")
-        {:ok, 2}
+        IO.puts("The two begin differently: #{Difference.options(one.options, other.options)}")
+        2
       end
     end
   end
 
-  defp told({:same, ticks}) do
-    IO.puts("The two are the same, #{Format.decimals(ticks / 10, 1)} s of them.")
+  defp told({:same, until_ms}) do
+    IO.puts("The two are the same, #{Format.seconds(until_ms)} of them.")
     0
   end
 
-  defp told({:ends, ticks}) do
-    IO.puts("The two are the same until one ends, after #{Format.decimals(ticks / 10, 1)} s.")
+  defp told({:ends, after_ms}) do
+    IO.puts("The two are the same until one ends, after #{Format.seconds(after_ms)}.")
     2
   end
 
@@ -79,21 +71,20 @@ defmodule Console.Replay do
     2
   end
 
-  defp replay(file, options) do
+  defp replay(recording, options) do
     with {:ok, tables} <- tables(options) do
       output = Output.to(:stdio)
-
-      until_ms =
-        round(1_000 * (options.at_s || options.until_s || Recording.File.last_ms(file) / 1000))
-
-      Output.line(output, heading(file))
+      Output.line(output, Recording.heading(recording))
+      asked_s = options.at_s || options.until_s
+      until_ms = if asked_s, do: round(1_000 * asked_s), else: Recording.last_ms(recording)
 
       run = %{
-        replay: Replay.new(file.setup),
+        replay: Recording.replay(recording, only(options)),
         before: nil,
         tick: nil,
         told: 0,
-        differences: [],
+        shown: [],
+        count: 0,
         drawn_ms: Hal.Clock.now_ms(),
         output: output,
         until_ms: until_ms,
@@ -102,19 +93,25 @@ defmodule Console.Replay do
       }
 
       run =
-        file
-        |> ticks()
+        recording
+        |> Recording.ticks()
         |> Stream.take_while(fn {at_ms, _entries} -> at_ms <= until_ms end)
         |> Enum.reduce(run, &step/2)
 
+      {replay, last} = Kind.finish(run.replay)
+      run = differs(%{run | replay: replay}, last)
       Output.finish(output)
-      Enum.each(Moment.lines(options, run), &IO.puts/1)
-      Enum.each(verdict(run), &IO.puts/1)
-      with :ok <- close(run.tables), do: {:ok, if(run.differences == [], do: 0, else: 2)}
+      Enum.each(Moment.lines(options, run, Recording.names(recording)), &IO.puts/1)
+      compared = Kind.compared(replay)
+      verdict = Verdict.lines(compared, Kind.at_ms(replay), run.shown, run.count)
+      Enum.each(verdict, &IO.puts/1)
+      with :ok <- close(run.tables), do: Verdict.status(compared, run.count)
     end
   end
 
-  defp ticks(file), do: Guard.watched(Recording.File.ticks(file))
+  # Another robot than the one that is shown may be asked why.
+  defp only(%{robot: name, why: why}) when why in [nil, name], do: name
+  defp only(_options), do: nil
 
   defp tables(%{csv: nil}), do: {:ok, nil}
   defp tables(%{csv: folder}), do: named(Tables.open(folder))
@@ -125,49 +122,33 @@ defmodule Console.Replay do
   defp named({:error, line}), do: {:error, "--csv #{line}"}
   defp named(ok), do: ok
 
-  defp heading(%{setup: setup} = file) do
-    "#{file.path}: #{Format.count(length(setup.robots), "robot")} in #{setup.options.map}, " <>
-      "seed #{setup.options.seed}, #{Format.decimals(Recording.File.last_ms(file) / 1000, 1)} s" <>
-      if(file.whole?, do: "", else: " (not ended in order: read as far as it is whole)")
+  defp step(tick, run) do
+    {replay, differences} = Kind.step(run.replay, tick)
+    run = differs(%{run | replay: replay, before: run.replay, tick: tick}, differences)
+    run |> tabulate() |> draw() |> tell()
   end
 
-  defp step(tick, run) do
-    {replay, differences} = Replay.step(run.replay, tick)
-    differences = Enum.take(run.differences ++ differences, @shown)
-    run = %{run | replay: replay, before: run.replay, tick: tick, differences: differences}
-    run |> tabulate() |> draw() |> tell()
+  defp differs(run, differences) do
+    shown = Enum.take(run.shown ++ differences, @shown)
+    %{run | shown: shown, count: run.count + length(differences)}
   end
 
   defp tabulate(%{tables: nil} = run), do: run
 
-  defp tabulate(%{tick: {_at_ms, entries}} = run),
-    do: %{run | tables: Tables.tick(run.tables, entries, Trial.scene(Replay.trial(run.replay)))}
+  defp tabulate(%{replay: replay} = run),
+    do: %{run | tables: Tables.tick(run.tables, Kind.facts(replay, run.tick), Kind.scene(replay))}
 
   defp draw(run) do
     Output.redraw(run, fn ->
-      {Replay.trial(run.replay).at_ms / 1000, run.until_ms / 1000, "replayed"}
+      {Kind.at_ms(run.replay) / 1000, run.until_ms / 1000, "replayed"}
     end)
   end
 
   defp tell(%{quiet?: true} = run), do: run
 
   defp tell(run) do
-    stages = Trial.stages(Replay.trial(run.replay))
+    stages = Kind.stages(run.replay)
     Enum.each(Enum.drop(stages, run.told), &Output.line(run.output, Format.stage(&1)))
     %{run | told: length(stages)}
-  end
-
-  defp verdict(%{differences: []} = run) do
-    [
-      "#{Format.decimals(Replay.trial(run.replay).at_ms / 1000, 1)} s replayed: all decisions on " <>
-        "#{run.replay.inputs} inputs, and all readings of the world, are as recorded."
-    ]
-  end
-
-  defp verdict(run) do
-    [
-      "The replay differs from the recording, first in this:"
-      | Enum.flat_map(run.differences, &Difference.lines/1)
-    ]
   end
 end

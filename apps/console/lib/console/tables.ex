@@ -1,6 +1,6 @@
 defmodule Console.Tables do
   @moduledoc """
-  Writes a run's tables (`Sim.Recording.Tables`) into a folder, row by row as it goes. An error is
+  Writes the tables of a run or of a recording (`Sim.Recording.Tables`) into a folder, row by row as it goes. An error is
   kept, and told by `close/1`.
   """
   alias Sim.Recording
@@ -41,9 +41,9 @@ defmodule Console.Tables do
   end
 
   @doc "Writes the rows of a tick."
-  @spec tick(t(), [Sim.Trial.entry()], Scene.t()) :: t()
-  def tick(%__MODULE__{} = tables, entries, scene) do
-    entries
+  @spec tick(t(), Recording.Facts.t(), Scene.t()) :: t()
+  def tick(%__MODULE__{} = tables, facts, scene) do
+    facts
     |> Recording.Tables.rows(scene, tables.told)
     |> Enum.reduce(tables, fn {table, rows}, tables -> put(tables, table, rows) end)
     |> Map.replace!(:told, length(scene.stages))

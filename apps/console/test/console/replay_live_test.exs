@@ -4,6 +4,7 @@ defmodule Console.ReplayLiveTest do
   import ExUnit.CaptureIO
   alias Console.{Demo, Live, Options, Replay, Runs}
   alias Robot.Recording
+  alias Sim.Replay.{Cursor, Kind}
   @moduletag :realtime
   @moduletag :tmp_dir
   @moduletag :capture_log
@@ -49,16 +50,18 @@ defmodule Console.ReplayLiveTest do
     refute text =~ "mag1   "
 
     assert {0, text, ""} = replay(path, ~w(--at 2 --why mag1))
-    assert text =~ ~r/^mag1: search of Missions.Landmark; at \(/m
-    assert text =~ "mag1 at 2.0 s"
+    assert text =~ ~r/^    2.0 s  2 robots, \d with the landmark in sight, no leader$/m
+    assert text =~ ~r/^mag1: search at .*; runs Missions.Landmark; drives .*s$/m
+    assert text =~ "Poses are those that the robots believe to have.\n"
+    assert text =~ ~r/^mag1 at 1\.[89] s$/m
     for title <- ~w(perceived wishes gate mission), do: assert(text =~ ~r/^#{title}.*:$/m)
     assert text =~ "<- chosen"
 
     for {words, said} <- [
-          {["--csv", folder], "--csv needs a recording of a run in lockstep"},
-          {["--against", path], "--against needs a recording of a run in lockstep"},
-          {~w(--why leader),
-           "--why names no robot of the recording: leader; allowed are mag1, min1"},
+          {["--csv", "/proc/none/tables"], "--csv /proc/none/tables cannot be written: "},
+          {["--against", "/proc/none.mcap"], "/proc/none.mcap"},
+          {~w(--why leadr),
+           "--why names no robot of the recording: leadr; allowed are leader, mag1, min1"},
           {~w(--robot mag), "--robot names no robot of the recording: mag"},
           {~w(--at 99), "--at 99.0 is after the end of the recording"}
         ] do
@@ -67,6 +70,13 @@ defmodule Console.ReplayLiveTest do
       assert length(String.split(error, "\n", trim: true)) == 1
     end
 
+    assert {0, text, ""} = replay(path, ~w(--at 0.5 --why leader))
+    assert text =~ "There is no leader at this time.\n"
+    gone_through(path)
+    tabulated(path, Path.join(folder, "tables"))
+    assert {0, text, ""} = replay(path, ["--against", path])
+    assert text =~ ~r/^The two are the same, \d\.\d s of them\.$/m
+
     # As a kill -9 leaves it.
     bytes = File.read!(path)
     cut = Path.join(folder, "cut.mcap")
@@ -74,6 +84,98 @@ defmodule Console.ReplayLiveTest do
     assert {0, text, ""} = replay(cut)
     assert text =~ "(not ended in order: read as far as it is whole)"
     assert text =~ "are as recorded."
+    assert {2, text, ""} = replay(path, ["--against", cut])
+    assert text =~ ~r/^The two are the same until one ends, after \d\.\d s\.$/m
+  end
+
+  # Forwards and backwards, and at each place as it was on the way there.
+  defp gone_through(path) do
+    typed = "show\nwhy mag1\nnext\nprevious\ngoto 2\nback 3\nstep 3\ngoto 0\nwhy\ngoto 2\n"
+    {:ok, options} = Replay.Options.parse([path, "--step", "--at", "2"])
+    {status, text} = with_io(typed, fn -> Replay.run(options) end)
+    assert status == 0
+    assert text =~ ~r/^mag1: search at .*; runs Missions.Landmark; drives/m
+    assert text =~ "<- chosen"
+    assert text =~ ~r/ search +every robot looks around for the landmark$/m
+    assert text =~ "1.7 s> step 3\n    2.0 s  2 robots"
+    assert text =~ "0.0 s> why\nNothing had been decided yet.\n"
+    assert [_one] = text |> lines_at("2.0 s") |> Enum.uniq()
+
+    {:ok, file} = Recording.File.open(path)
+    ticks = Enum.to_list(Recording.File.ticks(file))
+    assert Enum.flat_map(ticks, &elem(&1, 1)) == Enum.to_list(Recording.File.entries(file))
+    times = Enum.map(ticks, &elem(&1, 0))
+    assert times == Enum.uniq(Enum.sort(times)) and Enum.all?(times, &(rem(&1, 100) == 0))
+
+    for from_ms <- Enum.take_every(0..Recording.File.last_ms(file), 73) do
+      later = for {at_ms, _entries} = tick <- ticks, at_ms >= from_ms, do: tick
+      assert Enum.to_list(Recording.File.ticks(file, from_ms: from_ms)) == later
+    end
+
+    differs(file)
+  end
+
+  defp lines_at(text, time),
+    do: for(line <- String.split(text, "\n"), line =~ ~r/^ +#{time}  \d robots/, do: line)
+
+  # The cursor is at each place what a replay is that only goes forwards; one effect that is lost is told once.
+  defp differs(file) do
+    ticks = Enum.to_list(Recording.File.ticks(file))
+    start = Sim.Replay.Robots.new(file)
+    {all, _last} = Enum.map_reduce(ticks, start, &forwards/2)
+    from = fn ticks -> fn ms -> Enum.filter(ticks, &(elem(&1, 0) >= ms)) end end
+    cursor = Cursor.new(start, from.(ticks), every: 4, most: 3)
+
+    for {count, place} <- [{20, 20}, {-7, 13}, {4, 17}, {-17, 0}, {9, 9}], reduce: cursor do
+      cursor ->
+        assert {cursor, []} = Cursor.step(cursor, count)
+        assert cursor.here.replay == if(place == 0, do: start, else: Enum.at(all, place - 1))
+        cursor
+    end
+
+    {lost, _found?} =
+      Enum.map_reduce(ticks, false, fn {at_ms, entries}, found? ->
+        at = Enum.find_index(entries, &match?({:mag1, {:gate, :effect, {:drive, _, _}, _}}, &1))
+
+        if not found? and at_ms > 500 and at != nil,
+          do: {{at_ms, List.delete_at(entries, at)}, true},
+          else: {{at_ms, entries}, found?}
+      end)
+
+    cursor = Cursor.new(start, from.(lost))
+    assert {cursor, [{:decision, difference}]} = Cursor.step(cursor, 25)
+    assert %{robot: :mag1, role: :gate, recorded: [], replayed: [{:drive, _, _}]} = difference
+    assert difference.at_ms in 400..1_500
+    assert {cursor, []} = Cursor.step(cursor, -25)
+    assert {_cursor, []} = Cursor.step(cursor, 25)
+  end
+
+  defp forwards(tick, replay) do
+    assert {next, []} = Kind.step(replay, tick)
+    {next, next}
+  end
+
+  defp tabulated(path, folder) do
+    assert {0, _text, ""} = replay(path, ["--csv", folder])
+
+    tables =
+      for name <- ~w(poses errors ticks messages events), into: %{} do
+        text = File.read!(Path.join(folder, name <> ".csv"))
+        {name, for(row <- String.split(text, "\r\n", trim: true), do: String.split(row, ","))}
+      end
+
+    for {_name, [header | rows]} <- tables, row <- rows, do: assert(length(row) == length(header))
+    # A tick that was cut by the end may be without a drive.
+    moving = Enum.filter(tables["poses"], &match?({_speed, ""}, Float.parse(Enum.at(&1, 7))))
+    assert length(moving) > 20
+    assert [_at_s, id, "true", phase, x, _y, _heading, _speed, _turn] = List.last(tables["poses"])
+    assert id in ~w(mag1 min1) and phase in ~w(search agree lead follow)
+    assert {_x, ""} = Float.parse(x)
+    assert [_at_s, ^id, "", "", "", within] = List.last(tables["errors"])
+    assert {_within, ""} = Float.parse(within)
+    assert [_header, ["0.1", "", "0", "false", "", ""] | _] = tables["ticks"]
+    assert Enum.any?(tables["events"], &match?([_at_s, "search", "", _facts], &1))
+    assert [["at_s", "from", "to", "kind"] | _] = tables["messages"]
   end
 
   test "a recorder that crashes does not end the demo; the demo says so at its end", %{
@@ -129,15 +231,15 @@ defmodule Console.ReplayLiveTest do
   end
 
   # A file with these messages on our topics.
-  defp written(folder, robots, entries) do
+  defp written(folder, robots, entries, ns \\ 0) do
     path = Path.join(folder, "made.mcap")
     {about, trace, encoding} = Recording.topics()
     {writer, head} = Mcap.Writer.new([])
     {robots_id, writer} = Mcap.Writer.channel(writer, about, encoding, nil)
     {trace_id, writer} = Mcap.Writer.channel(writer, trace, encoding, nil)
-    {writer, one} = Mcap.Writer.message(writer, robots_id, 0, robots)
+    {writer, one} = Mcap.Writer.message(writer, robots_id, ns, robots)
     {bytes, _names} = Recording.trace(entries, %{}, MapSet.new())
-    {writer, two} = Mcap.Writer.message(writer, trace_id, 0, bytes)
+    {writer, two} = Mcap.Writer.message(writer, trace_id, ns, bytes)
     File.write!(path, [head, one, two, Mcap.Writer.finish(writer)])
     path
   end
@@ -188,15 +290,76 @@ defmodule Console.ReplayLiveTest do
     assert text =~ "replayed: all 1 decisions on 1 inputs are as recorded."
   end
 
+  test "two recordings are compared by the time since their start, of one kind alone", %{
+    tmp_dir: folder
+  } do
+    one = compared(folder, "one", 0, 0.5)
+    later = compared(folder, "later", 7_000, 0.5)
+    other = compared(folder, "other", 7_000, 0.25)
+    assert {0, "The two are the same, 0.2 s of them.\n", ""} = replay(one, ["--against", later])
+
+    assert {2, text, ""} = replay(one, ["--against", other])
+    assert text =~ "The two part in the tick that ends at 0.20 s:\n"
+    assert text =~ "  one:   0.10 s mag1, gate, effect: {:drive, %Hal.Twist{linear: 0.5, "
+    assert text =~ "  other: 0.10 s mag1, gate, effect: {:drive, %Hal.Twist{linear: 0.25, "
+
+    nobody = compared(folder, "nobody", 0, 0.5, [:mag2])
+    assert {2, text, ""} = replay(one, ["--against", nobody])
+    assert text == "The two begin differently: robots [:mag1] and [:mag2]\n"
+
+    run = Path.join(folder, "run.mcap")
+    demo = Runs.options("--headless --blobs direct --robots 1 --duration 1", ["--record", run])
+    with_io(fn -> Demo.run(demo, Sim.Trial) end)
+
+    for {one, other, kinds} <- [
+          {one, run, "#{one} is of live robots, #{run} is of a run in lockstep"},
+          {run, one, "#{run} is of a run in lockstep, #{one} is of live robots"}
+        ] do
+      assert replay(one, ["--against", other]) ==
+               {1, "", "replay: --against needs two recordings of one kind: #{kinds}\n"}
+    end
+  end
+
+  # A robot of another clock, which has heard the same at the same time since it began.
+  defp compared(folder, name, from_ms, speed, robots \\ [:mag1]) do
+    seen = fn at_ms -> {:cast, {:seen, %{at_ms: from_ms + at_ms}}} end
+
+    entries =
+      for id <- robots,
+          {kind, what, at_ms} <- [
+            {:input, seen.(-40), 0},
+            {:effect, {:drive, Hal.Twist.zero(), []}, 0},
+            {:input, seen.(60), 100},
+            {:effect, {:drive, Hal.Twist.new(speed, 0.0), []}, 100}
+          ],
+          do: {id, {:gate, kind, what, from_ms + at_ms}}
+
+    robots = Recording.robots(Map.new(robots, &{&1, %{offset_ms: 0, profile: nil}}))
+    made = written(folder, robots, entries, (from_ms + 1_000) * 1_000_000)
+    path = Path.join(folder, name <> ".mcap")
+    File.rename!(made, path)
+    path
+  end
+
   test "another version, and a file that cannot be made, are refused in one line", %{
     tmp_dir: folder
   } do
-    newer = :erlang.term_to_binary({:convoy_robots, 99, %{}})
-    path = written(folder, newer, [])
+    for {version, ours, other} <- [{1, 3, 2}, {99, 3, 2}] do
+      path = written(folder, :erlang.term_to_binary({:convoy_robots, version, %{}}), [])
+      run = Path.join(folder, "run.mcap")
+      {start, _ticks, encoding} = Sim.Recording.topics()
+      {writer, head} = Mcap.Writer.new([])
+      {id, writer} = Mcap.Writer.channel(writer, start, encoding, nil)
+      bytes = :erlang.term_to_binary({:convoy, version, %{}})
+      {writer, message} = Mcap.Writer.message(writer, id, 0, bytes)
+      File.write!(run, [head, message, Mcap.Writer.finish(writer)])
 
-    assert replay(path) ==
-             {1, "",
-              "replay: #{path} is a recording of version 99; this program reads version 3\n"}
+      for {file, reads} <- [{path, ours}, {run, other}] do
+        assert replay(file) ==
+                 {1, "",
+                  "replay: #{file} is a recording of version #{version}; this program reads version #{reads}\n"}
+      end
+    end
 
     options = Runs.options("--headless --hardware 1 --robots 1 --duration 1")
     options = %{options | record: "/proc/none.mcap"}

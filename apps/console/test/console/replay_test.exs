@@ -31,7 +31,7 @@ defmodule Console.ReplayTest do
     assert {0, text, ""} = replay(path)
     assert text =~ "#{path}: 3 robots in hall, seed 1, 25.0 s\n"
     assert text =~ ~r/ killed .* is dead/
-    assert text =~ ~r/25.0 s replayed: all decisions on \d+ inputs, .* are as recorded/
+    assert text =~ ~r/25.0 s replayed: all \d+ decisions on \d+ inputs, .* are as recorded/
 
     assert {0, text, ""} = replay(path, "--until 5")
     assert text =~ "5.0 s replayed"

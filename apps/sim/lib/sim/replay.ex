@@ -8,29 +8,25 @@ defmodule Sim.Replay do
   seen by geometry, as in the run. So a replay is a trial at each of its ticks, for whoever wants
   to see it (`trial/1`).
   """
+  @behaviour Sim.Replay.Kind
+  alias Robot.Mission.Runner
   alias Sim.{Radio, Recording, Trial}
   alias Sim.Trial.{Mechanics, Setup}
+  alias Swarm.Member
 
   @enforce_keys [:trial]
-  defstruct @enforce_keys ++ [inputs: 0, stage: :events]
+  defstruct @enforce_keys ++ [inputs: 0, decisions: 0, stage: :events]
 
   @typedoc """
-  `inputs` counts what the robots were told. A tick has three stages: its events, what the robots
+  `inputs` counts what the robots were told, `decisions` their effects that are as recorded. A tick has three stages: its events, what the robots
   do until the fleet is looked at, and the rest, in which the world goes on.
   """
   @type t :: %__MODULE__{
           trial: Trial.t(),
           inputs: non_neg_integer(),
+          decisions: non_neg_integer(),
           stage: :events | :robots | :world
         }
-
-  @typedoc """
-  Where the replay differs: in what a robot did on the same input, or in what its sensors told it.
-  """
-  @type difference ::
-          {:decision, Swarm.Replay.difference()}
-          | {:world, %{robot: atom(), at_ms: integer(), recorded: term(), replayed: term() | nil}}
-          | {:unknown, robot :: atom(), at_ms :: integer()}
 
   @doc "The start of a replay."
   @spec new(Setup.t()) :: t()
@@ -40,8 +36,7 @@ defmodule Sim.Replay do
   @spec trial(t()) :: Trial.t()
   def trial(%__MODULE__{trial: trial}), do: trial
 
-  @doc "Replays one tick, and returns where it differs, in order."
-  @spec step(t(), Recording.tick()) :: {t(), [difference()]}
+  @impl Sim.Replay.Kind
   def step(%__MODULE__{} = replay, {at_ms, entries}) do
     {replay, differences} = Enum.reduce(entries, {%{replay | stage: :events}, []}, &entry/2)
     {advance(replay, at_ms), Enum.reverse(differences)}
@@ -59,7 +54,9 @@ defmodule Sim.Replay do
     replay = replay |> advance(at_ms) |> settle(input)
     {trial, decided} = decide(replay.trial, id, input, effects, at_ms)
     differences = decided ++ sensed(replay.trial, id, input, at_ms) ++ differences
-    {%{replay | trial: trial, inputs: replay.inputs + 1}, differences}
+    same = if decided == [], do: length(effects), else: 0
+    counts = %{inputs: replay.inputs + 1, decisions: replay.decisions + same}
+    {Map.merge(%{replay | trial: trial}, counts), differences}
   end
 
   # Commands are given along with the events, before what these change is put into effect.
@@ -114,4 +111,58 @@ defmodule Sim.Replay do
 
   defp same(recorded, replayed, id, at_ms),
     do: [{:world, %{robot: id, at_ms: at_ms, recorded: recorded, replayed: replayed}}]
+
+  @impl Sim.Replay.Kind
+  def finish(%__MODULE__{} = replay), do: {replay, []}
+
+  @impl Sim.Replay.Kind
+  def at_ms(%__MODULE__{trial: trial}), do: trial.at_ms
+
+  @impl Sim.Replay.Kind
+  def stages(%__MODULE__{trial: trial}), do: Trial.stages(trial)
+
+  @impl Sim.Replay.Kind
+  def scene(%__MODULE__{trial: trial}), do: Trial.scene(trial)
+
+  # Readings and messages came to the robot before it decided; then came the gate's next step.
+  @impl Sim.Replay.Kind
+  def reasons(%__MODULE__{}, %__MODULE__{trial: before}, {_at_ms, entries}, id) do
+    inputs = for {:step, ^id, input, _effects} <- entries, do: input
+    member = Trial.robot(before, id)
+
+    case Enum.split_while(inputs, &(not match?({:tick, _at_ms}, &1))) do
+      {first, [{:tick, at_ms} | _] = decided} when member != nil ->
+        member = Enum.reduce(first, member, &elem(Member.step(&2, &1), 0))
+        {at_ms, Swarm.Replay.reasons(member, Enum.take(decided, 2))}
+
+      _dead_or_frozen ->
+        nil
+    end
+  end
+
+  @impl Sim.Replay.Kind
+  def doing(%__MODULE__{trial: trial}, id) do
+    with %Member{} = member <- Trial.robot(trial, id) do
+      mission = with {mission, _phase} <- Runner.state(Member.runner(member)), do: mission
+      driving = with {driving, _at_ms} <- member.lockstep.board[:driving], do: driving
+      %{mission: mission, driving: driving, known_ms: trial.at_ms}
+    else
+      nil -> %{mission: nil, driving: nil, known_ms: nil}
+    end
+  end
+
+  @impl Sim.Replay.Kind
+  def compared(%__MODULE__{} = replay) do
+    %{
+      parts: [],
+      inputs: replay.inputs,
+      decisions: replay.decisions,
+      lost: 0,
+      skipped: 0,
+      world?: true
+    }
+  end
+
+  @impl Sim.Replay.Kind
+  def facts(%__MODULE__{}, {_at_ms, entries}), do: Recording.Facts.of(entries)
 end

@@ -110,7 +110,7 @@ defmodule Sim.ReplayTest do
   test "two runs part where one has another event" do
     {_setup, one, _trial} = record([blobs: :direct], 60)
     {_setup, other, _trial} = record([blobs: :direct, script: [{3, {:estop, :mag3}}]], 60)
-    assert Recording.Comparison.first(one, one) == {:same, 60}
+    assert Recording.Comparison.first(one, one) == {:same, 6_000}
     assert {:differs, %{at_ms: 3_100, entries: entries}} = Recording.Comparison.first(one, other)
     assert {{:step, :mag1, _input, _effects}, {:world, 3_000, {:estop, :mag3}}} = entries
   end

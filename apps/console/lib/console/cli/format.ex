@@ -154,6 +154,15 @@ defmodule Console.Cli.Format do
   end
 
   @doc """
+  A time in ms as seconds with one decimal.
+
+      iex> Console.Cli.Format.seconds(12_340)
+      "12.3 s"
+  """
+  @spec seconds(number()) :: String.t()
+  def seconds(ms), do: "#{decimals(ms / 1000, 1)} s"
+
+  @doc """
   A count with its noun.
 
       iex> {Console.Cli.Format.count(1, "robot"), Console.Cli.Format.count(6, "robot"), Console.Cli.Format.count(0, "collision")}

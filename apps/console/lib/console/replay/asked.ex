@@ -5,11 +5,11 @@ defmodule Console.Replay.Asked do
   alias Hal.Options.Suggest
 
   @doc "Checks the options against the names of the recorded robots and the time of the last entry; the error is one line."
-  @spec check(Options.t(), robots :: [String.t()], why :: [String.t()], last_s :: float()) ::
+  @spec check(Options.t(), robots :: [String.t()], last_s :: float()) ::
           :ok | {:error, line :: String.t()}
-  def check(options, robots, why, last_s) do
+  def check(options, robots, last_s) do
     with :ok <- name("--robot", options.robot, robots),
-         :ok <- name("--why", options.why, why),
+         :ok <- name("--why", options.why, ["leader" | robots]),
          :ok <- time("--at", options.at_s, last_s),
          do: time("--until", options.until_s, last_s)
   end

@@ -2,13 +2,16 @@ defmodule Console.Replay.Difference do
   @moduledoc "Finds where a replay differs from its recording, or one recording from another, for people. Pure."
   alias Console.Cli.Format
 
-  @doc "A difference of a replay (`t:Sim.Replay.difference/0`), line by line."
-  @spec lines(Sim.Replay.difference()) :: [String.t()]
+  @doc "A difference of a replay (`t:Sim.Replay.Kind.difference/0`), line by line."
+  @spec lines(Sim.Replay.Kind.difference()) :: [String.t()]
   def lines({:decision, difference}) do
+    role = if difference[:role], do: ", #{difference.role}", else: ""
+    now = difference[:crash] || brief(difference.replayed -- difference.recorded)
+
     [
-      "#{at(difference.at_ms)} #{difference.robot}, on #{brief(difference.input)}",
+      "#{at(difference.at_ms)} #{difference.robot}#{role}, on #{brief(difference.input)}",
       "  did then: #{brief(difference.recorded -- difference.replayed)}",
-      "  does now: #{brief(difference.replayed -- difference.recorded)}"
+      "  does now: #{now}"
     ]
   end
 
@@ -36,6 +39,9 @@ defmodule Console.Replay.Difference do
   defp entry({:step, robot, input, effects}),
     do: "#{at(Swarm.Replay.at_ms(input))} #{robot} on #{brief(input)}: #{brief(effects)}"
 
+  defp entry({robot, {role, kind, what, at_ms}}),
+    do: "#{at(at_ms)} #{robot}, #{role}, #{kind}: #{brief(what)}"
+
   # The same robot on the same input has done something else.
   defp detail({:step, robot, input, one}, {:step, robot, input, other}),
     do: ["  #{robot} did #{brief(one -- other)} in one, #{brief(other -- one)} in the other"]
@@ -43,9 +49,9 @@ defmodule Console.Replay.Difference do
   defp detail(_one, _other), do: []
 
   @doc "In what two starts differ, by the names of their options."
-  @spec setups(Sim.Trial.Setup.t(), Sim.Trial.Setup.t()) :: String.t()
-  def setups(one, other) do
-    keys = for {key, value} <- Enum.sort(one.options), other.options[key] != value, do: key
+  @spec options(map(), map()) :: String.t()
+  def options(one, other) do
+    keys = for {key, value} <- Enum.sort(one), other[key] != value, do: key
 
     case keys do
       [] ->
@@ -55,7 +61,7 @@ defmodule Console.Replay.Difference do
         Enum.map_join(
           keys,
           ", ",
-          &"#{&1} #{brief(one.options[&1])} and #{brief(other.options[&1])}"
+          &"#{&1} #{brief(one[&1])} and #{brief(other[&1])}"
         )
     end
   end

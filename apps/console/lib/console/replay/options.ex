@@ -68,7 +68,7 @@ defmodule Console.Replay.Options do
   @spec help() :: String.t()
   def help do
     """
-    Replays a recorded run from its inputs, and says whether every decision is the same.
+    Replays a recording of a run or of robots from its inputs, and says whether every decision is the same.
 
       mix replay FILE.mcap [options]
 
@@ -99,7 +99,7 @@ defmodule Console.Replay.Options do
        "compare with another recording: the first tick that differs, and in what"},
       {"step", nil, nil, "go forwards and backwards tick by tick, and ask: a prompt"},
       {"csv", "DIR", &Parse.folder(&1, folder),
-       "write poses, errors, messages and ticks as tables"}
+       "write poses, errors, messages, ticks and events as tables"}
     ]
   end
 

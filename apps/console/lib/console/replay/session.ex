@@ -1,11 +1,10 @@
 defmodule Console.Replay.Session do
   @moduledoc false
-  # Runs `mix replay FILE --step`: a person goes forwards and backwards in a run, and asks how the fleet stood at each
+  # Runs `mix replay FILE --step`: a person goes forwards and backwards in a recording, and asks how the fleet stood at each
   # tick, and why. Reads commands (`Console.Replay.Command`) from standard input, a terminal or not, until its end.
   alias Console.Cli.{Format, Output, Progress}
-  alias Console.Replay.{Command, Difference, Guard, Moment, Options}
-  alias Sim.{Recording, Replay, Trial}
-  alias Sim.Replay.Cursor
+  alias Console.Replay.{Command, Difference, Moment, Options, Recording, Verdict}
+  alias Sim.Replay.{Cursor, Kind}
 
   # Long ways are gone in parts, and a terminal shows how far.
   @part_ms 5_000
@@ -14,16 +13,16 @@ defmodule Console.Replay.Session do
   # So many events of a way are told.
   @told 12
 
-  @doc "Goes on until the person quits: 2 if a tick differed that was passed, else 0."
-  @spec run(Options.t(), Recording.File.t()) :: 0 | 2
-  def run(%Options{} = options, file) do
+  @doc "Goes on until the person quits: 2 if a tick that was passed differed, or was not compared, else 0."
+  @spec run(Options.t(), Recording.t()) :: 0 | 2
+  def run(%Options{} = options, recording) do
     output = Output.to(:stdio)
 
     session = %{
-      cursor: Cursor.new(file.setup, &Guard.watched(Recording.File.ticks(file, from_ms: &1))),
+      cursor: Cursor.new(Recording.replay(recording, nil), &Recording.ticks(recording, &1)),
       options: options,
-      names: for(robot <- file.setup.robots, do: Atom.to_string(robot.id)),
-      last_ms: Recording.File.last_ms(file),
+      names: Recording.names(recording),
+      last_ms: Recording.last_ms(recording),
       output: output,
       echo?: output.columns == nil or not typed?(),
       differs?: false,
@@ -43,7 +42,7 @@ defmodule Console.Replay.Session do
   defp typed?, do: match?({:ok, %File.Stat{type: :device}}, File.stat("/dev/stdin"))
 
   defp ask(session) do
-    case IO.gets(seconds(Cursor.at_ms(session.cursor)) <> " s> ") do
+    case IO.gets(Format.seconds(Cursor.at_ms(session.cursor)) <> "> ") do
       line when is_binary(line) ->
         if session.echo?, do: IO.puts(String.trim_trailing(line, "\n"))
         answer(session, Command.parse(line, session.names, session.last_ms / 1000))
@@ -102,9 +101,11 @@ defmodule Console.Replay.Session do
     events = stages(session) |> Enum.drop(from) |> Enum.map(&Format.stage/1)
     Enum.each(few(events), &IO.puts/1)
     Enum.each(session.cursor.here.differences, &tell_difference/1)
-    IO.puts(Format.status(scene(session)))
-    if end?(before, session), do: IO.puts("The recording ends here.")
-    %{session | differs?: before.differs? or session.differs?}
+    %{replay: replay, end?: end?} = session.cursor.here
+    IO.puts(Format.status(Kind.scene(replay)))
+    if end? and not back?, do: IO.puts("The recording ends here.")
+    differs? = session.differs? or Verdict.gaps?(Kind.compared(replay))
+    %{session | differs?: before.differs? or differs?}
   end
 
   defp few(events) when length(events) <= @told, do: events
@@ -112,11 +113,6 @@ defmodule Console.Replay.Session do
   defp few(events) do
     {skipped, last} = Enum.split(events, -@told)
     ["… #{Format.count(length(skipped), "event")} before these" | last]
-  end
-
-  defp end?(before, session) do
-    at_ms = Cursor.at_ms(session.cursor)
-    at_ms >= session.last_ms and Cursor.at_ms(before.cursor) <= at_ms
   end
 
   defp tell_difference(difference) do
@@ -145,7 +141,7 @@ defmodule Console.Replay.Session do
     started = Cursor.at_ms(session.cursor)
 
     over? = fn replay ->
-      known(replay) > told or Replay.trial(replay).at_ms >= started + @part_ms
+      known(replay) > told or Kind.at_ms(replay) >= started + @part_ms
     end
 
     next = walk(session, &Cursor.until(&1, over?))
@@ -198,13 +194,11 @@ defmodule Console.Replay.Session do
   defp show(session, why, robot) do
     at_s = if why, do: nil, else: Cursor.at_ms(session.cursor) / 1000
     options = %{session.options | at_s: at_s, robot: robot, why: why}
-    Enum.each(Moment.lines(options, session.cursor.here), &IO.puts/1)
+    Enum.each(Moment.lines(options, session.cursor.here, session.names), &IO.puts/1)
   end
 
   defp known_before(%{cursor: %{here: %{before: nil}}}), do: 0
   defp known_before(%{cursor: %{here: %{before: before}}}), do: known(before)
-  defp known(replay), do: length(Trial.stages(Replay.trial(replay)))
-  defp stages(session), do: Trial.stages(Replay.trial(session.cursor.here.replay))
-  defp scene(session), do: Trial.scene(Replay.trial(session.cursor.here.replay))
-  defp seconds(ms), do: Format.decimals(ms / 1000, 1)
+  defp known(replay), do: length(Kind.stages(replay))
+  defp stages(session), do: Kind.stages(session.cursor.here.replay)
 end

@@ -3,6 +3,7 @@ defmodule Console.Replay.Why do
   alias Console.Cli.Format
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
+  alias Robot.Recording.Topics
 
   @doc "The reasons of a robot at a time in seconds, line by line."
   @spec lines(atom(), number(), Swarm.Replay.reasons()) :: [String.t()]
@@ -73,14 +74,16 @@ defmodule Console.Replay.Why do
 
   defp gate(%{driving: nil}), do: ["has let nothing through yet"]
 
-  defp gate(%{driving: %{twist: twist, limits: limits}}) do
-    by =
-      if limits == [],
-        do: "no limit",
-        else: "limited by " <> Enum.map_join(limits, ", ", &"#{&1}")
+  defp gate(%{driving: %{twist: twist, limits: limits}}),
+    do: ["lets #{twist(twist)} through, #{limited(limits) || "no limit"}"]
 
-    ["lets #{twist(twist)} through, #{by}"]
-  end
+  @doc "What a gate lets through, and what limits it."
+  @spec driving(%{twist: Twist.t(), limits: [atom()]}) :: String.t()
+  def driving(%{twist: twist, limits: limits}),
+    do: Enum.join([twist(twist) | List.wrap(limited(limits))], ", ")
+
+  defp limited([]), do: nil
+  defp limited(limits), do: "limited by #{Enum.join(limits, ", ")}"
 
   defp mission(%{mission: mission, before: before}) do
     for {label, text} <- mission do
@@ -95,7 +98,7 @@ defmodule Console.Replay.Why do
     Enum.map(effects, fn
       {:drive, twist} -> "drive #{twist(twist)}"
       {:look, pan, _tilt} -> "look #{Format.decimals(pan * 180 / :math.pi(), 0)}° to the left"
-      {:send, to, message} -> "send #{message.kind} to #{inspect(to)}"
+      {:send, to, message} -> "send #{Topics.kind(message) || "a message"} to #{inspect(to)}"
       {:stage, name, facts} -> "tell people: #{name} #{inspect(facts)}"
     end)
   end

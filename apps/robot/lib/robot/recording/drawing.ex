@@ -1,9 +1,12 @@
 defmodule Robot.Recording.Drawing do
-  @moduledoc false
-  # Draws what a robot knows, for Foxglove and other viewers of its schemas: where it believes itself
-  # to be, what others told it, what it sees, where it is going. Nothing here is known to be true. Pure.
+  @moduledoc """
+  Draws what a robot knows, for Foxglove and other viewers of its schemas: where it believes itself
+  to be, what others told it, what it sees, where it is going. Nothing of a scene is known to be true.
+  Its parts serve simulated runs, too. Pure.
+  """
   alias Hal.Pose
   alias Mcap.Foxglove
+  alias Mcap.Foxglove.Encode
   alias Mcap.Foxglove.Scene
   alias Robot.Percept
   alias Robot.Percept.Sighting
@@ -26,7 +29,7 @@ defmodule Robot.Recording.Drawing do
     id = Atom.to_string(percept.robot)
 
     entities =
-      [entity(ns, id, body(percept.pose, percept.profile.radius, "#{id} #{words}", @own))] ++
+      [entity(ns, id, body(place(percept.pose), percept.profile.radius, "#{id} #{words}", @own))] ++
         doubt(ns, percept) ++
         for(
           {peer, heard} <- Enum.sort(percept.peers),
@@ -40,21 +43,26 @@ defmodule Robot.Recording.Drawing do
 
   defp entity(ns, id, bodies), do: Scene.entity(ns, @frame, id, bodies)
 
-  defp body(pose, radius, words, colour) do
+  @doc "A robot of this radius (m) with these words above it; in a frame of its own it stands at the origin."
+  @spec body({{number(), number()}, heading :: number()}, number(), String.t(), Encode.color()) ::
+          [Scene.body()]
+  def body({{x, y}, heading}, radius, words, colour) do
     [
       Scene.cylinder(
-        {{pose.x, pose.y, @height / 2}, pose.heading},
+        {{x, y, @height / 2}, heading},
         {2 * radius, 2 * radius, @height},
         colour
       ),
       Scene.arrow(
-        {{pose.x, pose.y, @height + 0.05}, pose.heading},
+        {{x, y, @height + 0.05}, heading},
         {radius, 0.06, 0.12, 0.14},
         colour
       ),
-      Scene.text({{pose.x, pose.y, @height + 0.3}, 0}, words, 0.2, colour)
+      Scene.text({{x, y, @height + 0.3}, 0}, words, 0.2, colour)
     ]
   end
+
+  defp place(%Pose{heading: heading} = pose), do: {Pose.point(pose), heading}
 
   defp doubt(ns, %{pose: %{x: x, y: y}, uncertainty: %{radius: radius}}) do
     {r, g, b, _a} = @own
@@ -66,7 +74,7 @@ defmodule Robot.Recording.Drawing do
 
   defp peer(id, %{mode: mode} = heard) do
     colour = if mode == :dead, do: @dead, else: @other
-    body(heard.pose, heard.radius, "#{id} #{mode}", colour)
+    body(place(heard.pose), heard.radius, "#{id} #{mode}", colour)
   end
 
   defp seen(%{detections: nil}), do: []
@@ -87,9 +95,13 @@ defmodule Robot.Recording.Drawing do
     ]
   end
 
+  @doc "A place on the floor."
+  @spec spot(Pose.point(), Encode.color()) :: Scene.body()
+  def spot({x, y}, colour), do: Scene.cylinder({{x, y, 0.01}, 0}, {0.3, 0.3, 0.02}, colour)
+
   defp goal(%Pose{x: x, y: y, heading: heading}) do
     [
-      Scene.cylinder({{x, y, 0.01}, 0}, {0.3, 0.3, 0.02}, @goal),
+      spot({x, y}, @goal),
       Scene.arrow({{x, y, 0.02}, heading}, {0.2, 0.04, 0.08, 0.1}, @goal)
     ]
   end

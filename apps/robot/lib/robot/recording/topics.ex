@@ -38,22 +38,8 @@ defmodule Robot.Recording.Topics do
   @of_pictures [camera: "foxglove.CompressedImage", boxes: "foxglove.ImageAnnotations"]
 
   # Ticks come every 100 ms, more or less.
-  @place_ms 150
-  @state_ms 450
-  @blobs_ms 150
-  @scene_ms 950
-  @claim_ms 450
-  @new %{
-    phase: :idle,
-    driving: nil,
-    placed_ms: nil,
-    stated_ms: nil,
-    seen_ms: nil,
-    picture_ms: nil,
-    goal: nil,
-    drawn_ms: nil,
-    claimed_ms: nil
-  }
+  @every_ms %{place: 150, state: 450, blobs: 150, scene: 950, mission: 450}
+  @new %{phase: :idle, driving: nil, picture_ms: nil, goal: nil, said_ms: %{}}
 
   @doc """
   The topics of these robots, with those of pictures or without: key, name, and schema or `nil`, all
@@ -110,10 +96,10 @@ defmodule Robot.Recording.Topics do
          at_ms,
          ns
        ) do
-    {robot, state} = state(robot, id, percept, at_ms, ns)
-    {robot, blobs} = blobs(robot, id, percept.detections, at_ms)
-    {robot, place} = place(robot, id, percept.pose, at_ms, ns)
-    {robot, scene} = scene(robot, id, percept, at_ms, ns)
+    {state, robot} = due(robot, :state, at_ms, fn -> state(robot, id, percept, ns) end)
+    {blobs, robot} = blobs(robot, id, percept.detections, at_ms)
+    {place, robot} = place(robot, id, percept.pose, at_ms, ns)
+    {scene, robot} = scene(robot, id, percept, at_ms, ns)
     {robot, place ++ scene ++ state ++ blobs}
   end
 
@@ -139,8 +125,10 @@ defmodule Robot.Recording.Topics do
        ),
        do: {%{robot | goal: goal_pose(goal)}, []}
 
-  defp said(robot, id, {:pilot, :effect, {:claim, claim}}, at_ms, _ns),
-    do: claim(robot, id, claim, at_ms)
+  defp said(robot, id, {:pilot, :effect, {:claim, claim}}, at_ms, _ns) do
+    {said, robot} = due(robot, :mission, at_ms, fn -> [{{id, :mission}, claim(claim)}] end)
+    {robot, said}
+  end
 
   defp said(robot, id, {:pilot, :effect, {:send, to, message}}, _at_ms, _ns) do
     to = to |> List.wrap() |> Enum.map(&"#{&1}")
@@ -182,64 +170,57 @@ defmodule Robot.Recording.Topics do
   defp goal_pose(_other), do: nil
 
   defp message(from, to, message),
-    do: Json.encode!({:object, [from: from, to: to, kind: kind(message)]})
+    do: Json.encode!({:object, [from: from, to: to, kind: "#{kind(message) || "?"}"]})
 
   defp sender(%{from: from}) when is_atom(from), do: "#{from}"
   defp sender(_other), do: "?"
 
-  defp kind(%{kind: kind}) when is_atom(kind), do: "#{kind}"
-  defp kind(%Robot.Mission.Claim{}), do: "claim"
-  defp kind(_other), do: "?"
+  @doc "What kind of message a mission has sent, as far as it is known."
+  @spec kind(struct()) :: atom() | nil
+  def kind(%{kind: kind}) when is_atom(kind), do: kind
+  def kind(%Robot.Mission.Claim{}), do: :claim
+  def kind(_other), do: nil
 
-  defp claim(%{claimed_ms: claimed_ms} = robot, _id, _claim, at_ms)
-       when claimed_ms != nil and at_ms - claimed_ms < @claim_ms,
-       do: {robot, []}
+  # What is said only so often.
+  defp due(robot, what, at_ms, say) do
+    case robot.said_ms do
+      %{^what => said_ms} when at_ms - said_ms < :erlang.map_get(what, @every_ms) -> {[], robot}
+      _earlier -> {say.(), put_in(robot.said_ms[what], at_ms)}
+    end
+  end
 
-  defp claim(robot, id, claim, at_ms) do
+  defp claim(claim) do
     facts =
       for {key, value} <- Enum.sort(claim),
           is_atom(value) or is_number(value) or (is_binary(value) and String.valid?(value)),
           do: {key, value}
 
-    {%{robot | claimed_ms: at_ms}, [{{id, :mission}, Json.encode!({:object, facts})}]}
+    Json.encode!({:object, facts})
   end
-
-  defp scene(%{drawn_ms: drawn_ms} = robot, _id, _percept, at_ms, _ns)
-       when drawn_ms != nil and at_ms - drawn_ms < @scene_ms,
-       do: {robot, []}
 
   defp scene(robot, id, %{pose: %Pose{}} = percept, at_ms, ns) do
-    drawn = Drawing.scene(ns, percept, "#{robot.phase}", robot.goal)
-    {%{robot | drawn_ms: at_ms}, [{{id, :scene}, drawn}]}
+    due(robot, :scene, at_ms, fn ->
+      [{{id, :scene}, Drawing.scene(ns, percept, "#{robot.phase}", robot.goal)}]
+    end)
   end
 
-  defp scene(robot, _id, _percept, _at_ms, _ns), do: {robot, []}
+  defp scene(robot, _id, _percept, _at_ms, _ns), do: {[], robot}
 
-  defp place(robot, _id, nil, _at_ms, _ns), do: {robot, []}
-
-  defp place(%{placed_ms: placed_ms} = robot, _id, _pose, at_ms, _ns)
-       when placed_ms != nil and at_ms - placed_ms < @place_ms,
-       do: {robot, []}
+  defp place(robot, _id, nil, _at_ms, _ns), do: {[], robot}
 
   defp place(robot, id, pose, at_ms, ns) do
-    transforms = Foxglove.frame_transforms(ns, [{"map", Atom.to_string(id), pose}])
-    {%{robot | placed_ms: at_ms}, [{"/tf", transforms}]}
+    due(robot, :place, at_ms, fn ->
+      [{"/tf", Foxglove.frame_transforms(ns, [{"map", Atom.to_string(id), pose}])}]
+    end)
   end
 
-  defp state(%{stated_ms: stated_ms} = robot, _id, _percept, at_ms, _ns)
-       when stated_ms != nil and at_ms - stated_ms < @state_ms,
-       do: {robot, []}
-
-  defp state(robot, id, percept, at_ms, ns) do
+  defp state(robot, id, percept, ns) do
     within = with %{radius: radius} <- percept.uncertainty, do: radius
     facts = [phase: robot.phase, within_m: within] ++ driving(robot.driving)
 
-    pose =
-      if percept.pose,
-        do: [{{id, :pose}, Foxglove.pose_in_frame(ns, "map", percept.pose)}],
-        else: []
-
-    {%{robot | stated_ms: at_ms}, [{{id, :state}, Json.encode!({:object, facts})} | pose]}
+    [{{id, :state}, Json.encode!({:object, facts})}] ++
+      for %Pose{} = pose <- [percept.pose],
+          do: {{id, :pose}, Foxglove.pose_in_frame(ns, "map", pose)}
   end
 
   defp driving(nil), do: []
@@ -247,18 +228,13 @@ defmodule Robot.Recording.Topics do
   defp driving({twist, limits}),
     do: [speed_m_s: twist.linear, turn_rad_s: twist.turn, limits: Enum.map(limits, &"#{&1}")]
 
-  defp blobs(robot, _id, nil, _at_ms), do: {robot, []}
-  defp blobs(%{picture_ms: at_ms} = robot, _id, %{at_ms: at_ms}, _now_ms), do: {robot, []}
+  defp blobs(robot, _id, nil, _at_ms), do: {[], robot}
+  defp blobs(%{picture_ms: at_ms} = robot, _id, %{at_ms: at_ms}, _now_ms), do: {[], robot}
 
-  defp blobs(%{seen_ms: seen_ms} = robot, _id, _detections, at_ms)
-       when seen_ms != nil and at_ms - seen_ms < @blobs_ms,
-       do: {robot, []}
-
-  defp blobs(robot, id, detections, at_ms) do
-    facts = [pan: detections.pan, blobs: Enum.map(detections.blobs, &blob/1)]
-
-    {%{robot | seen_ms: at_ms, picture_ms: detections.at_ms},
-     [{{id, :blobs}, Json.encode!({:object, facts})}]}
+  defp blobs(robot, id, %{at_ms: taken_ms} = seen, at_ms) do
+    facts = fn -> {:object, pan: seen.pan, blobs: Enum.map(seen.blobs, &blob/1)} end
+    {said, robot} = due(robot, :blobs, at_ms, fn -> [{{id, :blobs}, Json.encode!(facts.())}] end)
+    {said, if(said == [], do: robot, else: %{robot | picture_ms: taken_ms})}
   end
 
   defp blob(blob) do

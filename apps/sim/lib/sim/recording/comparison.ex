@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Comparison do
-  @moduledoc "Compares two recordings tick by tick, and finds where they part. Pure."
-  alias Sim.Recording
+  @moduledoc "Compares two recordings of a kind tick by tick, and finds where they part. Pure."
+  alias Sim.Replay.Kind
 
   @typedoc """
   The first tick that differs: the first entry that only one of them has there, or that is
@@ -8,31 +8,31 @@ defmodule Sim.Recording.Comparison do
   """
   @type difference :: %{
           at_ms: non_neg_integer(),
-          entries: {Sim.Trial.entry() | nil, Sim.Trial.entry() | nil}
+          entries: {entry :: term() | nil, entry :: term() | nil}
         }
 
   @doc """
-  The first difference of two runs' ticks, or how many ticks are equal.
+  The first difference of the ticks of two recordings, or when the last equal tick ended.
 
       iex> tick = {100, [{:world, 0, {:kill, :mag1}}]}
       iex> Sim.Recording.Comparison.first([tick], [tick])
-      {:same, 1}
+      {:same, 100}
       iex> Sim.Recording.Comparison.first([tick], [{100, []}])
       {:differs, %{at_ms: 100, entries: {{:world, 0, {:kill, :mag1}}, nil}}}
       iex> Sim.Recording.Comparison.first([tick, {200, []}], [tick])
-      {:ends, 1}
+      {:ends, 100}
   """
   @spec first(Enumerable.t(), Enumerable.t()) ::
-          {:same, non_neg_integer()}
-          | {:ends, after_ticks :: non_neg_integer()}
+          {:same, until_ms :: non_neg_integer()}
+          | {:ends, after_ms :: non_neg_integer()}
           | {:differs, difference()}
   def first(one, other) do
     one
     |> pairs(other)
     |> Enum.reduce_while({:same, 0}, fn
-      {tick, tick}, {:same, count} -> {:cont, {:same, count + 1}}
-      {nil, _tick}, {:same, count} -> {:halt, {:ends, count}}
-      {_tick, nil}, {:same, count} -> {:halt, {:ends, count}}
+      {{at_ms, _entries} = tick, tick}, _same -> {:cont, {:same, at_ms}}
+      {nil, _tick}, {:same, at_ms} -> {:halt, {:ends, at_ms}}
+      {_tick, nil}, {:same, at_ms} -> {:halt, {:ends, at_ms}}
       {tick, other}, _same -> {:halt, {:differs, difference(tick, other)}}
     end)
   end
@@ -44,9 +44,15 @@ defmodule Sim.Recording.Comparison do
 
   defp endless(ticks), do: Stream.concat(ticks, Stream.cycle([nil]))
 
-  @spec difference(Recording.tick(), Recording.tick()) :: difference()
-  defp difference({at_ms, entries}, {other_ms, others}),
-    do: %{at_ms: min(at_ms, other_ms), entries: part(entries, others)}
+  # In a gap of one recording the other one has more.
+  @spec difference(Kind.tick(), Kind.tick()) :: difference()
+  defp difference({at_ms, entries}, {at_ms, others}),
+    do: %{at_ms: at_ms, entries: part(entries, others)}
+
+  defp difference({at_ms, entries}, {other_ms, _others}) when at_ms < other_ms,
+    do: %{at_ms: at_ms, entries: part(entries, [])}
+
+  defp difference(_later, {at_ms, others}), do: %{at_ms: at_ms, entries: part([], others)}
 
   defp part([entry | entries], [entry | others]), do: part(entries, others)
   defp part(entries, others), do: {List.first(entries), List.first(others)}

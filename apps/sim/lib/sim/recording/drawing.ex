@@ -3,10 +3,10 @@ defmodule Sim.Recording.Drawing do
   alias Hal.Pose
   alias Mcap.Foxglove
   alias Mcap.Foxglove.Scene, as: Bodies
+  alias Robot.Recording.Drawing
   alias Sim.{Floorplan, Scene}
 
   @frame "map"
-  @height 0.4
   # A point of a way every 0.2 m, the last 1,000.
   @apart_m 0.2
   @points 1_000
@@ -83,7 +83,7 @@ defmodule Sim.Recording.Drawing do
       for(robot <- scene.robots, do: robot(ns, robot)) ++
         for(
           %{slot: {x, y}} = robot <- scene.robots,
-          do: entity(ns, "place of #{robot.id}", slot({x, y}))
+          do: entity(ns, "place of #{robot.id}", [Drawing.spot({x, y}, @slot)])
         ) ++
         for {x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))
 
@@ -94,13 +94,7 @@ defmodule Sim.Recording.Drawing do
 
   # In its own frame, with which it moves between two scenes.
   defp robot(ns, %{id: id, radius: radius} = robot) do
-    colour = colour(robot)
-
-    bodies = [
-      Bodies.cylinder({{0, 0, @height / 2}, 0}, {2 * radius, 2 * radius, @height}, colour),
-      Bodies.arrow({{0, 0, @height + 0.05}, 0}, {radius, 0.06, 0.12, 0.14}, colour),
-      Bodies.text({{0, 0, @height + 0.3}, 0}, "#{id} #{robot.state}", 0.2, colour)
-    ]
+    bodies = Drawing.body({{0, 0}, 0}, radius, "#{id} #{robot.state}", colour(robot))
 
     Bodies.entity(ns, Atom.to_string(id), Atom.to_string(id), bodies, frame_locked: true)
   end
@@ -109,7 +103,6 @@ defmodule Sim.Recording.Drawing do
   defp colour(%{leader?: true}), do: @leader
   defp colour(_robot), do: @living
 
-  defp slot({x, y}), do: [Bodies.cylinder({{x, y, 0.01}, 0}, {0.3, 0.3, 0.02}, @slot)]
   defp pole({x, y}), do: [Bodies.cylinder({{x, y, 0.5}, 0}, {0.3, 0.3, 1.0}, @landmark)]
 
   @doc "The ways with where the robots are now."

@@ -44,7 +44,7 @@ defmodule Sim.Recording.Facts do
   at what speed each drives, and what each camera saw.
   """
   @type t :: %{
-          sent: [{atom(), to :: term(), kind :: atom(), Pose.t() | nil}],
+          sent: [{atom(), to :: term(), kind :: atom() | nil, Pose.t() | nil}],
           speeds: %{atom() => Twist.t()},
           seen: [{atom(), Vision.Detections.t()}]
         }

@@ -11,7 +11,6 @@ defmodule Sim.Recording.Pictures do
   @tick_ms 100
   @lowest 0.1
   @highest 5
-  @colour {1, 1, 1}
 
   @doc "How many pictures a second of each robot can be recorded: the lowest and the highest rate."
   @spec rates() :: {number(), number()}
@@ -49,12 +48,4 @@ defmodule Sim.Recording.Pictures do
   @spec picture(atom(), at_ms :: non_neg_integer(), jpeg :: binary()) :: iodata()
   def picture(id, at_ms, jpeg),
     do: Foxglove.compressed_image(at_ms * 1_000_000, "#{id}", jpeg, "jpeg")
-
-  @doc "What was found in a picture, as boxes that viewers draw on it."
-  @spec boxes(Vision.Detections.t()) :: iodata()
-  def boxes(%{at_ms: at_ms, blobs: blobs}) do
-    boxes = for blob <- blobs, do: {{blob.left, blob.top, blob.right, blob.bottom}, blob.colour}
-
-    Foxglove.image_boxes(at_ms * 1_000_000, boxes, @colour)
-  end
 end

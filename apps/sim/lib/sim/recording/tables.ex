@@ -1,6 +1,6 @@
 defmodule Sim.Recording.Tables do
   @moduledoc """
-  Writes a run as tables for other programs (CSV as in RFC 4180). Pure.
+  Writes a recording as tables for other programs (CSV as in RFC 4180). Pure.
 
   | table | a row |
   |---|---|
@@ -9,7 +9,12 @@ defmodule Sim.Recording.Tables do
   | `ticks` | each 100 ms: who leads, and the formation's error |
   | `messages` | each message: who sent it to whom |
   | `events` | what happened to the fleet |
+
+  Of robots of processes `poses` are those that they believe, `alive` says whether something was recorded of the robot in
+  the second before, and `messages` has those of the missions, without heartbeats. Nobody knows their places in the formation nor
+  its error: these columns are empty.
   """
+  alias Sim.Recording.Facts
   alias Sim.Scene
 
   @headers [
@@ -32,22 +37,15 @@ defmodule Sim.Recording.Tables do
   def headers, do: for({table, line} <- @headers, do: {table, [line, "\r\n"]})
 
   @doc "The rows of a tick; of the scene's stages only those after the first `told`."
-  @spec rows([Sim.Trial.entry()], Scene.t(), told :: non_neg_integer()) :: [{table(), iodata()}]
-  def rows(entries, %Scene{} = scene, told) do
+  @spec rows(Facts.t(), Scene.t(), told :: non_neg_integer()) :: [{table(), iodata()}]
+  def rows(facts, %Scene{} = scene, told) do
     at_s = scene.at_ms / 1000
-    steps = for {:step, id, _input, effects} <- entries, do: {id, effects}
-    speeds = for {id, effects} <- steps, {:drive, twist} <- effects, into: %{}, do: {id, twist}
 
     [
-      poses: for(robot <- scene.robots, do: pose(at_s, robot, speeds[robot.id])),
-      errors: for(%{slot: {_x, _y}} = robot <- scene.robots, do: error(at_s, robot)),
+      poses: for(robot <- scene.robots, do: pose(at_s, robot, facts.speeds[robot.id])),
+      errors: for(robot <- scene.robots, robot.slot || believed?(scene), do: error(at_s, robot)),
       ticks: [tick(at_s, scene)],
-      messages:
-        for(
-          {id, effects} <- steps,
-          {:send, to, message} <- effects,
-          do: message(at_s, id, to, message)
-        ),
+      messages: for({id, to, kind, _pose} <- facts.sent, do: message(at_s, id, to, kind)),
       events: for(stage <- Enum.drop(scene.stages, told), do: event(stage))
     ]
   end
@@ -58,15 +56,20 @@ defmodule Sim.Recording.Tables do
     row([at_s, robot.id, robot.alive, robot.state, x, y, heading, linear, turn])
   end
 
-  defp error(at_s, %{slot: {x, y}} = robot),
-    do: row([at_s, robot.id, x, y, Scene.slot_error(robot), robot.uncertainty])
+  # Of robots of processes nobody knows the truth, nor a map.
+  defp believed?(scene), do: scene.map == nil
+
+  defp error(at_s, robot) do
+    {x, y} = robot.slot || {nil, nil}
+    row([at_s, robot.id, x, y, Scene.slot_error(robot), robot.uncertainty])
+  end
 
   defp tick(at_s, scene) do
     {mean, most} = scene.error || {nil, nil}
     row([at_s, scene.leader, scene.epoch, scene.formed?, mean, most])
   end
 
-  defp message(at_s, from, to, %{kind: kind}),
+  defp message(at_s, from, to, kind),
     do: row([at_s, from, to |> List.wrap() |> Enum.map_join(" ", &Atom.to_string/1), kind])
 
   defp event(%{stage: name, at_s: at_s} = stage) do

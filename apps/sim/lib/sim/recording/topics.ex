@@ -20,7 +20,7 @@ defmodule Sim.Recording.Topics do
   """
   alias Mcap.{Foxglove, Writer}
   alias Sim.{Recording, Scene}
-  alias Sim.Recording.{Drawing, Facts, Pictures}
+  alias Sim.Recording.{Drawing, Facts}
   alias Sim.Trial.Setup
 
   @robots_ms 500
@@ -129,7 +129,8 @@ defmodule Sim.Recording.Topics do
   # The picture is the one in which the blobs of this tick were found.
   defp picture({id, picture}, seen) do
     [{{id, :camera}, picture}] ++
-      for {^id, seen} <- seen, do: {{id, :boxes}, Pictures.boxes(seen)}
+      for {^id, seen} <- seen,
+          do: {{id, :boxes}, Robot.Recording.Drawing.boxes(seen.at_ms * 1_000_000, seen)}
   end
 
   defp write(topics, writer, ns, messages) do

@@ -176,8 +176,10 @@ defmodule Sim.Trial.Evaluation do
     end
   end
 
-  defp state(nil), do: :dead
+  @doc "What a robot does, in one word for people, by its claim; `nil` is that of one that is dead."
+  @spec state(map() | nil) :: atom()
+  def state(nil), do: :dead
   # What keeps it from moving comes before what it would do.
-  defp state(%{estop: _callers}), do: :estop
-  defp state(claim), do: Claim.state(claim)
+  def state(%{estop: _callers}), do: :estop
+  def state(claim), do: Claim.state(claim)
 end

@@ -35,7 +35,7 @@ defmodule Sim.Replay.CursorTest do
 
   test "wherever one goes, forwards or backwards, the run is as it was there", context do
     random = :rand.seed_s(:exsss, 7)
-    cursor = Cursor.new(context.setup, from(context.ticks), every: 8, most: 4)
+    cursor = Cursor.new(Replay.new(context.setup), from(context.ticks), every: 8, most: 4)
 
     Enum.reduce(1..40, {cursor, 0, random}, fn _n, {cursor, number, random} ->
       {count, random} = :rand.uniform_s(101, random)
@@ -48,7 +48,9 @@ defmodule Sim.Replay.CursorTest do
 
   test "one step and one step back lead to the same place, also at a state that is kept",
        context do
-    {cursor, []} = Cursor.new(context.setup, from(context.ticks), every: 10) |> Cursor.step(30)
+    {cursor, []} =
+      Cursor.new(Replay.new(context.setup), from(context.ticks), every: 10) |> Cursor.step(30)
+
     {on, []} = Cursor.step(cursor, 1)
     {back, []} = Cursor.step(on, -1)
     assert back.here == cursor.here
@@ -56,7 +58,7 @@ defmodule Sim.Replay.CursorTest do
   end
 
   test "times lead to the last tick that has ended then", context do
-    cursor = Cursor.new(context.setup, from(context.ticks))
+    cursor = Cursor.new(Replay.new(context.setup), from(context.ticks))
     {cursor, []} = Cursor.goto(cursor, 5_050)
     is_at(cursor, 50, context)
     assert Cursor.at_ms(cursor) == 5_000
@@ -69,7 +71,7 @@ defmodule Sim.Replay.CursorTest do
   end
 
   test "it goes on until something happens, or to the end", context do
-    cursor = Cursor.new(context.setup, from(context.ticks))
+    cursor = Cursor.new(Replay.new(context.setup), from(context.ticks))
     dead? = fn replay -> map_size(Replay.trial(replay).members) < 3 end
     {cursor, []} = Cursor.until(cursor, dead?)
     assert dead?.(cursor.here.replay) and not dead?.(cursor.here.before)
@@ -86,7 +88,7 @@ defmodule Sim.Replay.CursorTest do
         {at_ms, Enum.map(entries, &wrong/1)}
       end)
 
-    cursor = Cursor.new(context.setup, from(ticks), every: 10)
+    cursor = Cursor.new(Replay.new(context.setup), from(ticks), every: 10)
     {cursor, [_ | _] = found} = Cursor.step(cursor, 25)
     assert length(found) <= 3
     {cursor, []} = Cursor.step(cursor, -10)
