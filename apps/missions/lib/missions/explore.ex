@@ -102,6 +102,9 @@ defmodule Missions.Explore do
         }
 
   @impl Robot.Mission
+  def phases, do: [:explore, :explored]
+
+  @impl Robot.Mission
   defdelegate option_table, to: Options, as: :table
 
   @impl Robot.Mission

@@ -68,7 +68,7 @@ defmodule Sim.Scenario.View do
   def distance(%{world: %{landmark: landmark}} = trial, robot) do
     with %{^robot => member} <- trial.members,
          %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <-
-           Swarm.Member.claim(member),
+           RunLog.account(trial.run_log, Member.claim(member)),
          do: {millimetres / 1000, Pose.distance(pose(trial, robot), landmark)},
          else: (_does_not_see -> nil)
   end

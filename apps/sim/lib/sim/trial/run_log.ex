@@ -6,7 +6,8 @@ defmodule Sim.Trial.RunLog do
   alias Sim.Scene
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 
-  defstruct roles: %{},
+  defstruct mission: nil,
+            roles: %{},
             stages: [],
             leader: nil,
             epoch: 0,
@@ -31,11 +32,12 @@ defmodule Sim.Trial.RunLog do
         }
 
   @typedoc """
-  `roles` are those of the mission's phases and stages (`c:Robot.Mission.roles/0`); `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
+  `roles` are those of the phases and stages (`c:Robot.Mission.roles/0`); `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
   radio; `formed_ms` and `rest_ms` say since when the fleet has been in formation, or at rest
   without a landmark; `ticks` and `formed_ticks` count from the first election.
   """
   @type t :: %__MODULE__{
+          mission: module() | nil,
           roles: %{atom() => Robot.Mission.role()},
           stages: [stage()],
           leader: atom() | nil,
@@ -55,7 +57,7 @@ defmodule Sim.Trial.RunLog do
 
   @doc "An empty run log of a mission."
   @spec new(module()) :: t()
-  def new(mission), do: %__MODULE__{roles: Robot.Mission.roles(mission)}
+  def new(mission), do: %__MODULE__{mission: mission, roles: Robot.Mission.roles(mission)}
 
   @doc "Records a stage; a search that others have already begun is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
@@ -133,11 +135,17 @@ defmodule Sim.Trial.RunLog do
     %{run_log | claims: Claims.note(run_log.claims, at_ms, leaders, worst)}
   end
 
-  defp role(run_log, claim), do: run_log.roles[claim[:phase]]
-
   @doc "The same tick for the invariant of `Sim.Trial.Stuck`; `rows` is called once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
   def watch(run_log, at_ms, rows), do: %{run_log | stuck: Stuck.note(run_log.stuck, at_ms, rows)}
+
+  @doc "What a robot that claims this does for its group (`c:Robot.Mission.roles/0`); `nil` for nothing."
+  @spec role(t(), claim :: map()) :: Robot.Mission.role() | nil
+  def role(run_log, claim), do: run_log.roles[claim[:phase]]
+
+  @doc "What such a claim says (`c:Robot.Mission.account/1`)."
+  @spec account(t(), claim :: map()) :: Robot.Mission.account()
+  def account(run_log, claim), do: Robot.Mission.account(run_log.mission, claim)
 
   @doc "The leader now; among several, the one of the highest epoch."
   @spec leader(t()) :: atom() | nil
