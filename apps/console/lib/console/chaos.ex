@@ -3,7 +3,7 @@ defmodule Console.Chaos do
   alias Console.Chaos.{Options, Report}
   alias Console.Cli.{OutFile, Output, Progress}
   alias Console.Scenario.Recording
-  alias Sim.Chaos.{Runner, ScenarioFile}
+  alias Sim.Chaos.{Draw, Runner, ScenarioFile}
   alias Sim.Scenario
 
   @doc """
@@ -39,16 +39,19 @@ defmodule Console.Chaos do
     done = fn played ->
       :counters.add(counts, 1, 1)
       :counters.add(counts, 2, length(played.failures))
-      Enum.each(played.failures, &Output.line(output, Report.failure(options.seed, &1)))
+      Enum.each(played.failures, &Output.line(output, Report.failure(Options.words(options), &1)))
       note = Report.note(:counters.get(counts, 2))
       columns = (output.columns || 80) - 1
       Output.progress(output, Progress.line(:counters.get(counts, 1), all, note, columns, "runs"))
     end
 
+    draw = if options.mission && draw == [], do: [draw: drawn(options.mission)], else: draw
     jobs = if options.jobs, do: [jobs: options.jobs], else: []
     Output.progress(output, Progress.line(0, all, "", (output.columns || 80) - 1, "runs"))
     Runner.run(options.seed, numbers, jobs ++ draw ++ [attempts: options.attempts, done: done])
   end
+
+  defp drawn({_text, mission}), do: &Draw.instead(Draw.options(&1, &2), mission)
 
   defp finish(report, options) do
     with :ok <- keep(report, options.keep), :ok <- write(options.json, report) do

@@ -46,7 +46,7 @@ defmodule Console.ChaosTest do
     assert Options.numbers(options) == 17..17
     assert {:ok, %Options{help: true}} = Options.parse(["-h"])
 
-    for option <- ~w(runs seed run attempts jobs json keep),
+    for option <- ~w(runs seed run attempts jobs json keep mission),
         do: assert(Options.help() =~ "--#{option} ")
   end
 
@@ -58,6 +58,15 @@ defmodule Console.ChaosTest do
              ~s(--seed: expected a whole number from 0 to 4294967295, got "x"),
              ~s(--json: expected a file in a folder that exists, got "no/such/folder/a.json")
            ]
+  end
+
+  test "another mission is named with its options, or refused in one line" do
+    assert {:ok, %Options{mission: {"patrol:period=90", {Missions.Patrol, own}}}} =
+             Options.parse(~w(--mission patrol:period=90))
+
+    assert own[:period] == 90
+    assert {:error, [line]} = Options.parse(~w(--mission patrl))
+    assert line =~ ~r/^--mission: mission "patrl" is not known; .*did you mean patrol\?$/
   end
 
   test "clean runs end with 0 and a table" do
@@ -160,7 +169,7 @@ defmodule Console.ChaosTest do
       attempts: 12
     }
 
-    assert Report.failure(7, failure) ==
+    assert Report.failure("--seed 7", failure) ==
              "run 4: stuck at 45.0 s, min1: 1.20 m off (mix chaos --seed 7 --run 4); " <>
                "shrunk to 2 robots, 1 event, 46 s"
   end

@@ -334,7 +334,7 @@ defmodule Console.ReplayLiveTest do
           ],
           do: {id, {:gate, kind, what, from_ms + at_ms}}
 
-    robots = Recording.robots(Map.new(robots, &{&1, %{offset_ms: 0, profile: nil}}))
+    robots = Recording.robots(Map.new(robots, &{&1, %{offset_ms: 0, profile: nil}}), MapSet.new())
     made = written(folder, robots, entries, (from_ms + 1_000) * 1_000_000)
     path = Path.join(folder, name <> ".mcap")
     File.rename!(made, path)

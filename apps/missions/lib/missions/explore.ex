@@ -1,9 +1,6 @@
 defmodule Missions.Explore do
   @moduledoc """
-  Explores: robots see all of a building that they do not know, and make its map together. Pure; written with the
-  interface of `Robot.Mission` alone.
-
-  Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
+  Explores: robots see all of a building that they do not know, and make its map together. Pure. Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
   they estimate. Once a second it looks for the frontiers of what is known (`Robot.Navigation.Frontiers`), chooses one (`.Choice`), and tells
   the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
@@ -100,6 +97,9 @@ defmodule Missions.Explore do
           why: String.t() | nil,
           started?: boolean()
         }
+
+  @impl Robot.Mission
+  def phases, do: [:explore, :explored]
 
   @impl Robot.Mission
   defdelegate option_table, to: Options, as: :table

@@ -83,6 +83,9 @@ defmodule Missions.Flock do
         }
 
   @impl Robot.Mission
+  def phases, do: [:gather, :flock, :arrived]
+
+  @impl Robot.Mission
   defdelegate option_table, to: Options, as: :table
 
   @impl Robot.Mission

@@ -81,6 +81,18 @@ defmodule Missions.Landmark do
     do: %{lead: :leads, follow: :follows, search: :searches, rest: :rests, elected: :elects}
 
   @impl Robot.Mission
+  defdelegate account(claim), to: Landmark.Claim
+
+  @impl Robot.Mission
+  defdelegate shape(claim, pose, ahead_m), to: Landmark.SlotPoses
+
+  @impl Robot.Mission
+  defdelegate place(mission, at_ms), to: Landmark.SlotPoses
+
+  @impl Robot.Mission
+  defdelegate phases, to: Transitions
+
+  @impl Robot.Mission
   defdelegate explain(mission), to: Landmark.Explanation, as: :lines
 
   @impl Robot.Mission

@@ -69,6 +69,9 @@ defmodule Missions.Patrol do
         }
 
   @impl Robot.Mission
+  def phases, do: [:watch, :visit]
+
+  @impl Robot.Mission
   defdelegate option_table, to: Options, as: :table
 
   @impl Robot.Mission

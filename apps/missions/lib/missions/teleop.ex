@@ -26,6 +26,9 @@ defmodule Missions.Teleop do
         }
 
   @impl Robot.Mission
+  def phases, do: [:idle, :wait, :driven]
+
+  @impl Robot.Mission
   def option_table do
     [
       speed: [{:number, 0.05, 2, "m/s"}, default: 0.5],

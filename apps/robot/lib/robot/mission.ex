@@ -132,6 +132,42 @@ defmodule Robot.Mission do
   """
   @callback roles() :: %{(phase_or_stage :: atom()) => role()}
 
+  @typedoc """
+  What a claim says, for those who judge whole runs: `state:` what the robot does, in one word for people, which is a phase that
+  `:follows` only while a follower is under way to its place; `says:` what it says of that place; `sight:` how large it sees
+  what the mission looks for (millionths of its picture), and how far off (mm), `nil` if it does not.
+  """
+  @type account :: %{
+          state: atom(),
+          says: [:in_place | :unsure | :blocked],
+          sight: %{:size_ppm => non_neg_integer(), :distance => non_neg_integer() | nil} | nil
+        }
+
+  @doc "What a claim says. Without this callback: its phase, and nothing else."
+  @callback account(claim :: map()) :: account()
+
+  @typedoc "A shape, and the number and pose of each robot's place in it."
+  @type shape :: %{
+          formation: {kind :: atom(), spacing_m :: float()},
+          slots: %{(robot :: atom()) => {number :: pos_integer(), Hal.Pose.t()}}
+        }
+
+  @doc """
+  What a leader with this claim means each robot's place to be, if it stands at `pose` and what it leads them to is so many
+  metres ahead; `nil` if it says nothing of that. Without this callback robots have no places.
+  """
+  @callback shape(claim :: map(), pose :: Hal.Pose.t(), ahead_m :: float()) :: shape() | nil
+
+  @doc """
+  The place that the robot takes now, which no other robot may take, too; or what is wrong with the places that it gives to
+  others, in one line; `nil` for neither. Without this callback: `nil`.
+  """
+  @callback place(mission :: term(), at_ms :: integer()) ::
+              {:slot, term()} | {:fault, line :: String.t()} | nil
+
+  @doc "All phases, for those who name one in a file. Without this callback: those of `c:roles/0`."
+  @callback phases() :: [atom()]
+
   @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
   @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.raster()
 
@@ -144,6 +180,10 @@ defmodule Robot.Mission do
                       stale: 1,
                       commands: 0,
                       roles: 0,
+                      account: 1,
+                      shape: 3,
+                      place: 2,
+                      phases: 0,
                       map: 1
 
   @doc """
@@ -178,12 +218,39 @@ defmodule Robot.Mission do
 
   @doc "The roles of a mission's phases and stages (`c:roles/0`)."
   @spec roles(module()) :: %{atom() => role()}
-  def roles(module),
-    do:
-      if(Code.ensure_loaded?(module) and function_exported?(module, :roles, 0),
-        do: module.roles(),
-        else: %{}
-      )
+  def roles(module), do: if(has?(module, :roles, 0), do: module.roles(), else: %{})
+
+  @doc """
+  What a claim of this mission says (`c:account/1`).
+
+      iex> for claim <- [%{phase: :goto}, %{}], do: Robot.Mission.account(Robot.Mission.Manual, claim).state
+      [:goto, :idle]
+  """
+  @spec account(module(), claim :: map()) :: account()
+  def account(module, claim) do
+    if has?(module, :account, 1),
+      do: module.account(claim),
+      else: %{state: Map.get(claim, :phase, :idle), says: [], sight: nil}
+  end
+
+  @doc "What a leader means each robot's place to be (`c:shape/3`)."
+  @spec shape(module(), claim :: map(), Hal.Pose.t(), float()) :: shape() | nil
+  def shape(module, claim, pose, ahead_m),
+    do: if(has?(module, :shape, 3), do: module.shape(claim, pose, ahead_m))
+
+  @doc "The place that a robot takes, or what is wrong with those that it gives (`c:place/2`)."
+  @spec place(module(), mission :: term(), integer()) ::
+          {:slot, term()} | {:fault, String.t()} | nil
+  def place(module, mission, at_ms),
+    do: if(has?(module, :place, 2), do: module.place(mission, at_ms))
+
+  @doc "The phases of a mission (`c:phases/0`)."
+  @spec phases(module()) :: [atom()]
+  def phases(module),
+    do: if(has?(module, :phases, 0), do: module.phases(), else: Map.keys(roles(module)))
+
+  defp has?(module, callback, arity),
+    do: Code.ensure_loaded?(module) and function_exported?(module, callback, arity)
 
   @doc "Whether a mission says what its options are."
   @spec checks?(module()) :: boolean()

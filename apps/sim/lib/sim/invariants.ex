@@ -25,7 +25,7 @@ defmodule Sim.Invariants do
   """
   alias Sim.Invariants.{Attempt, Leaders, Limits, Slots, Stops, Violation, Withdrawals}
   alias Sim.{Radio, Trial}
-  alias Sim.Trial.{Claims, Faults, Stuck}
+  alias Sim.Trial.{Claims, Faults, RunLog, Stuck}
   alias Swarm.Member
 
   @names [:two_leaders, :same_epoch, :two_majorities, :not_together, :no_leader] ++
@@ -91,22 +91,32 @@ defmodule Sim.Invariants do
 
   @doc "One tick: the trial after a step."
   @spec note(t(), Trial.t()) :: t()
-  def note(judge, %Trial{at_ms: at_ms, world: world} = trial) do
+  def note(judge, %Trial{at_ms: at_ms, world: world, run_log: log} = trial) do
     # What a frozen robot claimed last is nothing that it says or does now.
     frozen? = &Faults.any?(trial.faults, [:frozen], &1, at_ms - 1)
-    claims = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
-    ids = for {id, _claim} <- claims, do: id
+    said = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
+    ids = for {id, _claim} <- said, do: id
     parts = Radio.parts(trial.radio, ids)
     stops = for id <- ids, into: %{}, do: {id, Member.role(trial.members[id], :estop).stop}
     held = for {id, %{held: [_ | _]}} <- stops, do: id
 
-    missions =
-      for id <- ids, mission = Member.runner(trial.members[id]).mission, do: {id, mission}
+    runners = for id <- ids, into: %{}, do: {id, Member.runner(trial.members[id])}
+
+    places =
+      for id <- ids,
+          %{module: module, mission: mission} when module != nil <- [runners[id]],
+          place = Robot.Mission.place(module, mission, at_ms),
+          do: {id, place}
+
+    # What a robot with another mission claims is nothing that this one says.
+    claims =
+      for {id, claim} <- said,
+          do: {id, if(runners[id].module == log.mission, do: known(claim, log), else: %{})}
 
     bodies = for id <- ids, do: world.robots[id]
 
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, parts)
-    {placed, slots} = Slots.note(judge.slots, at_ms, missions)
+    {placed, slots} = Slots.note(judge.slots, at_ms, places)
     {driven, limits} = Limits.note(judge.limits, at_ms, bodies, held, lifted(trial))
     {stopped, stops} = Stops.note(judge.stops, at_ms, stops, parts)
     withdrawals = Withdrawals.note(judge.withdrawals, at_ms, claims)
@@ -130,9 +140,15 @@ defmodule Sim.Invariants do
   agree on places, and how their wheels turn, is inside processes, or between two looks.
   """
   @spec watch(t(), Sim.Fleet.moment()) :: t()
-  def watch(judge, %{at_ms: at_ms, claims: claims, faults: faults} = moment) do
+  def watch(judge, %{at_ms: at_ms, faults: faults, run_log: log} = moment) do
     frozen? = &Faults.any?(faults, [:frozen], &1, at_ms - 1)
-    claims = for {id, _claim} = row <- claims, not frozen?.(id), do: row
+    phases = Robot.Mission.phases(log.mission)
+
+    claims =
+      for {id, claim} <- moment.claims,
+          not frozen?.(id),
+          do: {id, if(claim[:phase] in phases, do: known(claim, log), else: %{})}
+
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, moment.parts)
     withdrawals = Withdrawals.note(judge.withdrawals, at_ms, claims)
     {touched, judge} = contacts(judge, moment.world)
@@ -177,6 +193,11 @@ defmodule Sim.Invariants do
   @spec violated?(t(), atom()) :: boolean()
   def violated?(judge, invariant),
     do: Enum.any?(judge.told, fn {{name, _robots}, _violation} -> name == invariant end)
+
+  defp known(claim, log) do
+    more = %{role: RunLog.role(log, claim), sight: RunLog.account(log, claim).sight}
+    Map.merge(claim, more)
+  end
 
   # Those that a person has put somewhere else in this step.
   defp lifted(%{at_ms: at_ms, run_log: %{stages: newest_first}}) do

@@ -19,13 +19,12 @@ defmodule Sim.InvariantsTest do
     Map.merge(%{robots: @three, loss: 0.0, policy: :available, of: nil, delay_ms: {5, 50}}, more)
   end
 
-  defp lead(id, epoch), do: {id, %{phase: :lead, leader: id, epoch: epoch, sight: nil}}
+  defp lead(id, epoch), do: claim(id, :lead, :leads, id, epoch)
+  defp follow(id, leader, epoch), do: claim(id, :follow, :follows, leader, epoch)
+  defp agree(id, sight), do: claim(id, :agree, nil, nil, 0, sight)
 
-  defp follow(id, leader, epoch),
-    do: {id, %{phase: :follow, leader: leader, epoch: epoch, sight: nil}}
-
-  defp agree(id, sight),
-    do: {id, %{phase: :agree, leader: nil, epoch: 0, sight: sight}}
+  defp claim(id, phase, role, leader, epoch, sight \\ nil),
+    do: {id, %{phase: phase, role: role, leader: leader, epoch: epoch, sight: sight}}
 
   # What a judge finds first in so many ticks of the same; `nil` if nothing.
   defp first(module, judge, ticks, arguments, from_ms \\ 0) do
@@ -126,6 +125,12 @@ defmodule Sim.InvariantsTest do
     defp follower(id, anchor, at_ms),
       do: {id, %{phase: :follow, me: id, anchor: anchor, anchor_ms: at_ms}}
 
+    defp places(missions, at_ms) do
+      for {id, mission} <- missions,
+          place = Missions.Landmark.place(mission, at_ms),
+          do: {id, place}
+    end
+
     test "two followers that believe two orders for longer than an anchor is good" do
       other = anchor(order: [:mag3, :mag2], sequence: 6)
 
@@ -134,7 +139,7 @@ defmodule Sim.InvariantsTest do
 
       {found, _judge} =
         Enum.flat_map_reduce(1..30, judge, fn k, judge ->
-          Slots.note(judge, 100 * k, tick.(100 * k))
+          Slots.note(judge, 100 * k, places(tick.(100 * k), 100 * k))
         end)
 
       assert [%Violation{invariant: :same_slot, robots: [:mag2, :mag3], at_ms: 1_600} | _] = found
@@ -142,7 +147,7 @@ defmodule Sim.InvariantsTest do
       # Each in an epoch of its own, or with an anchor that is too old.
       for {mine, at_ms} <- [{anchor(epoch: 2), 9_900}, {anchor([]), 8_000}] do
         missions = [follower(:mag2, mine, at_ms), follower(:mag3, other, 9_900)]
-        assert {[], %{same: same}} = Slots.note(judge, 10_000, missions)
+        assert {[], %{same: same}} = Slots.note(judge, 10_000, places(missions, 10_000))
         assert same == %{}
       end
     end
@@ -151,10 +156,10 @@ defmodule Sim.InvariantsTest do
       leader = {:mag1, %{phase: :lead, anchor: anchor(places: [1, 1])}}
 
       assert {[%Violation{invariant: :bad_anchor, robots: [:mag1]}], _judge} =
-               Slots.note(Slots.new(options()), 100, [leader])
+               Slots.note(Slots.new(options()), 100, places([leader], 100))
 
       right = {:mag1, %{phase: :lead, anchor: anchor([])}}
-      assert {[], _judge} = Slots.note(Slots.new(options()), 100, [right])
+      assert {[], _judge} = Slots.note(Slots.new(options()), 100, places([right], 100))
     end
   end
 

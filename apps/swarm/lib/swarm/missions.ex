@@ -55,6 +55,11 @@ defmodule Swarm.Missions do
   @spec names() :: [String.t()]
   def names, do: Enum.map(known(), fn {name, _module} -> Atom.to_string(name) end)
 
+  @doc "The phases of all missions (`c:Robot.Mission.phases/0`)."
+  @spec phases() :: [atom()]
+  def phases,
+    do: for({_name, module} <- known(), phase <- Mission.phases(module), uniq: true, do: phase)
+
   @doc "What people call a mission: its name, or its module if it has none."
   @spec name(module()) :: String.t()
   def name(module) do

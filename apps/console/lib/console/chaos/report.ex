@@ -5,10 +5,10 @@ defmodule Console.Chaos.Report do
   alias Sim.Invariants
   alias Sim.Invariants.Violation
 
-  @doc "The line of a failure: the run, what was wrong, and the command that plays it again."
-  @spec failure(integer(), Runner.failure()) :: String.t()
-  def failure(seed, %{number: number, violation: violation} = failure) do
-    "run #{number}: #{Violation.line(violation)} (mix chaos --seed #{seed} --run #{number})" <>
+  @doc "The line of a failure: the run, what was wrong, and the command that plays it again; `words` are its options that draw (`Console.Chaos.Options.words/1`)."
+  @spec failure(String.t(), Runner.failure()) :: String.t()
+  def failure(words, %{number: number, violation: violation} = failure) do
+    "run #{number}: #{Violation.line(violation)} (mix chaos #{words} --run #{number})" <>
       size(failure)
   end
 

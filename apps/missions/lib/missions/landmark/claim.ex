@@ -93,25 +93,25 @@ defmodule Missions.Landmark.Claim do
   defp sight?(_other), do: false
 
   @doc """
-  What a robot does, in one word for people, by the claim of its mission: its phase, or how a follower fares.
+  What a claim says (`c:Robot.Mission.account/1`): the state is its phase, or how a follower fares.
 
       iex> for more <- [%{}, %{in_place: true}, %{unsure: true}, %{blocked: true}],
-      ...>   do: Missions.Landmark.Claim.state(Map.put(more, :phase, :follow))
+      ...>   do: Missions.Landmark.Claim.account(Map.put(more, :phase, :follow)).state
       [:follow, :in_place, :unsure, :blocked]
-      iex> Missions.Landmark.Claim.state(%{})
-      :idle
+      iex> Missions.Landmark.Claim.account(%{})
+      %{state: :idle, says: [], sight: nil}
   """
-  @spec state(map()) :: atom()
-  def state(%{blocked: true}), do: :blocked
-  def state(%{phase: :follow, in_place: true}), do: :in_place
-  def state(%{phase: :follow, unsure: true}), do: :unsure
-  def state(%{phase: phase}), do: phase
-  def state(_new), do: :idle
+  @spec account(map()) :: Robot.Mission.account()
+  def account(claim) do
+    says = for word <- [:in_place, :unsure, :blocked], claim[word] == true, do: word
+    %{state: state(claim), says: says, sight: claim[:sight]}
+  end
 
-  @doc "The size at which it sees the landmark, in millionths of its picture; `nil` if it does not see it."
-  @spec size(map()) :: non_neg_integer() | nil
-  def size(%{sight: %{size_ppm: size}}), do: size
-  def size(_blind), do: nil
+  defp state(%{blocked: true}), do: :blocked
+  defp state(%{phase: :follow, in_place: true}), do: :in_place
+  defp state(%{phase: :follow, unsure: true}), do: :unsure
+  defp state(%{phase: phase}), do: phase
+  defp state(_new), do: :idle
 
   @doc """
   A leadership lapses after a second of silence: others may have elected another leader by then. An anchor is good for as long,

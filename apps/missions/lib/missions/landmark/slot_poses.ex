@@ -12,6 +12,8 @@ defmodule Missions.Landmark.SlotPoses do
 
   @ahead_ms 500
   @default_distance 1.2
+  # An anchor is good for so long (docs/architecture.md, table of times).
+  @fresh_ms 1_000
 
   @doc "The leader's pose and speed from an anchor that is `age_ms` old."
   @spec leader(Reference.t(), non_neg_integer()) :: {Pose.t(), Twist.t()}
@@ -43,17 +45,40 @@ defmodule Missions.Landmark.SlotPoses do
   @spec discs(Reference.t()) :: [{x :: float(), y :: float(), radius :: float()}]
   def discs(anchor), do: for({x, y} <- [landmark(anchor)], do: {x, y, LandmarkTrack.radius()})
 
-  @doc """
-  All used slots, `{number, pose}` in the order of the robots, as the leader of the anchor intends them, when it stands at
-  `pose` and its landmark, in truth, so many metres ahead.
-  """
-  @spec intended(Reference.t(), Pose.t(), distance :: float()) :: [{pos_integer(), Pose.t()}]
-  def intended(%Reference{trail: nil} = anchor, pose, distance) do
+  @doc "All used slots, as the leader of the claim intends them (`c:Robot.Mission.shape/3`)."
+  @spec shape(map(), Pose.t(), ahead_m :: float()) :: Robot.Mission.shape() | nil
+  def shape(%{anchor: %Reference{} = anchor}, pose, ahead_m) do
+    slots = anchor.order |> Enum.zip(intended(anchor, pose, ahead_m)) |> Map.new()
+    %{formation: anchor.formation, slots: slots}
+  end
+
+  def shape(_no_leader, _pose, _ahead_m), do: nil
+
+  @doc "The slot of a follower with a fresh anchor, and what is wrong with that of a leader (`c:Robot.Mission.place/2`)."
+  @spec place(map(), integer()) :: {:slot, tuple()} | {:fault, String.t()} | nil
+  def place(%{phase: :follow, anchor: %Reference{} = anchor} = mission, at_ms)
+      when at_ms - mission.anchor_ms <= @fresh_ms do
+    with index when index != nil <- Enum.find_index(anchor.order, &(&1 == mission.me)) do
+      place = Enum.at(anchor.places, index)
+      group = {anchor.leader, anchor.epoch, anchor.formation, anchor.size, anchor.trail != nil}
+      {:slot, {group, place}}
+    end
+  end
+
+  def place(%{phase: :lead, anchor: %Reference{order: order, places: places} = anchor}, _at_ms) do
+    unless Reference.valid?(anchor),
+      do: {:fault, "order #{inspect(order)}, places #{inspect(places)} of #{anchor.size}"}
+  end
+
+  def place(_other, _at_ms), do: nil
+
+  # In the order of the robots.
+  defp intended(%Reference{trail: nil} = anchor, pose, distance) do
     slots = anchor.formation |> Formation.slots(anchor.size, distance) |> List.to_tuple()
     for place <- anchor.places, do: {place, Pose.compose(pose, elem(slots, place - 1))}
   end
 
-  def intended(%Reference{trail: trail, pose: {x, y, heading}}, pose, _distance) do
+  defp intended(%Reference{trail: trail, pose: {x, y, heading}}, pose, _distance) do
     believed = Pose.new(x / 1000, y / 1000, heading / 1000)
 
     for {{sx, sy, sh}, place} <- Enum.with_index(trail, 1) do

@@ -8,7 +8,7 @@ defmodule Sim.Chaos.Draw do
   """
   alias Sim.Chaos.Draw.{Events, Faults}
   alias Sim.Chaos.Random
-  alias Sim.Trial.Setup
+  alias Sim.Trial.{Options, Setup}
 
   # Fixed lists, so that no draw makes an atom.
   @mags for k <- 1..20, do: :"mag#{k}"
@@ -54,6 +54,20 @@ defmodule Sim.Chaos.Draw do
       radio ++
       [noise: noise, duration_s: duration_s, blobs: blobs, casts: casts] ++ mission
   end
+
+  @landmark [:formation, :assign, :leader_change, :policy, :lost_link]
+
+  @doc """
+  Such a run with another mission. Its robots know the walls, unless they make a map.
+
+      iex> run = Sim.Chaos.Draw.options(1, 3)
+      iex> patrol = Sim.Chaos.Draw.instead(run, {Missions.Patrol, []})
+      iex> {Keyword.keys(run -- patrol), patrol -- run}
+      {[:formation, :assign, :leader_change, :policy, :lost_link], [mission: {Missions.Patrol, []}, plan: :known]}
+  """
+  @spec instead(keyword(), {module(), keyword()}) :: keyword()
+  def instead(run, mission),
+    do: Keyword.drop(run, @landmark) ++ [mission: mission, plan: Options.plan(mission)]
 
   defp robots(random) do
     {size, random} = Random.weighted(random, few: 3, some: 8, many: 3, twenty: 1)

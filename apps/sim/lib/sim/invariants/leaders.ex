@@ -77,7 +77,10 @@ defmodule Sim.Invariants.Leaders do
   @spec factor(number()) :: float()
   def factor(loss), do: 1 / max((1 - loss) * (1 - loss), 0.01)
 
-  @doc "One tick: the claims of the robots that can act, and the parts that they are in."
+  @doc """
+  One tick: what the robots that can act claim of the run's mission, with each one's `role` and `sight`
+  (`t:Robot.Mission.role/0`, `t:Robot.Mission.account/0`), and the parts that they are in.
+  """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]]) :: {[Violation.t()], t()}
   def note(judge, at_ms, claims, parts) do
     claims = Map.new(claims)
@@ -99,7 +102,7 @@ defmodule Sim.Invariants.Leaders do
   end
 
   defp leading(leading, claims, at_ms) do
-    for {id, %{phase: :lead, epoch: epoch}} <- claims, into: %{} do
+    for {id, %{role: :leads} = claim} <- claims, epoch = claim[:epoch] || 0, into: %{} do
       case leading do
         %{^id => {_since, ^epoch} = same} -> {id, same}
         _new -> {id, {at_ms, epoch}}
@@ -144,8 +147,8 @@ defmodule Sim.Invariants.Leaders do
     {wrong, clocks}
   end
 
-  # A robot whose mission is over, or another one, claims no epoch.
-  defp takes_part?(%{phase: phase, epoch: _epoch}), do: phase != :idle
+  # A robot whose mission is over, or another one, claims nothing of it.
+  defp takes_part?(%{phase: phase}), do: phase != :idle
   defp takes_part?(_other), do: false
 
   defp clock(clocks, name, true, at_ms), do: Map.put(clocks, name, clocks[name] || at_ms)
@@ -157,12 +160,12 @@ defmodule Sim.Invariants.Leaders do
     do: if(at_ms - since > limit_ms * judge.factor, do: at_ms - since)
 
   defp apart?(active, [leader | _], claims) do
-    epoch = claims[leader].epoch
+    epoch = claims[leader][:epoch]
 
     Enum.any?(active, fn id ->
       claim = claims[id]
-      phase = if id == leader, do: :lead, else: :follow
-      {claim.phase, claim.leader, claim.epoch} != {phase, leader, epoch}
+      role = if id == leader, do: :leads, else: :follows
+      {claim.role, claim[:leader], claim[:epoch]} != {role, leader, epoch}
     end)
   end
 
@@ -196,7 +199,7 @@ defmodule Sim.Invariants.Leaders do
   defp says(active, claims) do
     Enum.map_join(active, ", ", fn id ->
       claim = claims[id]
-      "#{id} #{claim.phase} of #{claim.leader || "nobody"} in #{claim.epoch}"
+      "#{id} #{claim.phase} of #{claim[:leader] || "nobody"} in #{claim[:epoch] || "no epoch"}"
     end)
   end
 

@@ -27,11 +27,11 @@ defmodule Sim.Invariants.Withdrawals do
   def new(%{delay_ms: {_least, most}}),
     do: %__MODULE__{limit_ms: @later_ms + @unformed_ms + @beat_ms + most}
 
-  @doc "One tick, after a step, which the trial made 100 ms before."
+  @doc "One tick, after a step, which the trial made 100 ms before; each claim has its `role` (`t:Robot.Mission.role/0`)."
   @spec note(t(), integer(), [{atom(), map()}]) :: t()
   def note(notes, at_ms, claims) do
     made_ms = at_ms - 100
-    leaders = for {id, %{phase: :lead, formed: true}} <- claims, do: id
+    leaders = for {id, %{role: :leads, formed: true}} <- claims, do: id
     {open, over} = Map.split(notes.open, leaders)
     ended = Map.new(over, fn {id, since_ms} -> {{id, since_ms}, made_ms} end)
 

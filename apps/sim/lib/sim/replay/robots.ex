@@ -7,7 +7,6 @@ defmodule Sim.Replay.Robots do
   Leader, epoch, `formed` and stages are judged from the missions' claims, as for a live fleet (`Sim.Fleet`).
   """
   @behaviour Sim.Replay.Kind
-  alias Missions.Landmark.Claim
   alias Robot.Percept
   alias Robot.Recording
   alias Robot.Recording.Topics
@@ -154,18 +153,18 @@ defmodule Sim.Replay.Robots do
   end
 
   defp seen(replay, id, robot) do
-    claim = claim(replay, id)
+    account = Evaluation.account_of(robot.mission, claim(replay, id))
 
     %{
       id: id,
       pose: robot.pose,
       radius: robot.radius,
       alive: living?(replay, robot),
-      state: Evaluation.state(claim),
+      state: account.state,
       slot: nil,
       leader?: id == RunLog.leader(replay.run_log),
       uncertainty: robot.uncertainty,
-      size_ppm: Claim.size(claim)
+      size_ppm: account.sight && account.sight.size_ppm
     }
   end
 

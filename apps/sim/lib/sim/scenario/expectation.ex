@@ -32,7 +32,6 @@ defmodule Sim.Scenario.Expectation do
   count. Those about the whole run take `from_s` (0) and `to_s` (its end).
   """
   alias Hal.Options.Type
-  alias Missions.Landmark.Transitions
   alias Sim.Trial.Form
 
   @type t :: tuple()
@@ -129,9 +128,9 @@ defmodule Sim.Scenario.Expectation do
   defp seconds, do: {:number, 0, 1_000_000, "s"}
   defp required(type), do: [type, required: true]
 
-  @doc "The phases that a robot may be in."
+  @doc "The phases that a robot may be in, with any mission that has a name (`c:Robot.Mission.phases/0`)."
   @spec phases() :: [atom()]
-  def phases, do: Transitions.phases() ++ (@alone -- Transitions.phases())
+  def phases, do: Enum.uniq(Swarm.Missions.phases() ++ @alone)
 
   @doc """
   The options of an expectation.

@@ -101,7 +101,8 @@ defmodule Sim.Scenario.View do
   @spec distance(t(), atom()) :: {measured :: float(), true_m :: float()} | nil
   def distance(%{world: %{landmark: landmark}} = view, robot) do
     with {_id, claim} <- List.keyfind(view.claims, robot, 0),
-         %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <- claim,
+         %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <-
+           RunLog.account(view.run_log, claim),
          do: {millimetres / 1000, Pose.distance(pose(view, robot), landmark)},
          else: (_does_not_see -> nil)
   end

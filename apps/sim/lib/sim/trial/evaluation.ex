@@ -3,7 +3,6 @@ defmodule Sim.Trial.Evaluation do
   # Evaluates a run from outside, by true poses: how far each robot is from its slot, relative to
   # the leader's true pose. Robots never see this. Pure.
   alias Hal.Pose
-  alias Missions.Landmark.{Claim, Reference, SlotPoses}
   alias Sim.{Scene, World}
   alias Sim.Trial.{AgreementMetrics, Claims, RunLog, Setup, Stuck}
 
@@ -21,23 +20,24 @@ defmodule Sim.Trial.Evaluation do
   @spec scene(run()) :: Scene.t()
   def scene(run) do
     leader = RunLog.leader(run.run_log)
-    slots = slots(run, leader)
+    shape = shape(run, leader)
 
     robots =
       for id <- run.options.robots do
         claim = run.claims[id]
-        {_index, slot} = Map.get(slots, id, {nil, nil})
+        {_index, slot} = Map.get(shape.slots, id, {nil, nil})
+        account = account(run, claim)
 
         %{
           id: id,
           pose: World.truth(run.world, id),
           radius: Setup.profile(id).radius,
           alive: claim != nil,
-          state: state(claim),
+          state: account.state,
           slot: slot && Pose.point(slot),
           leader?: id == leader,
           uncertainty: claim[:uncertainty],
-          size_ppm: claim && Claim.size(claim)
+          size_ppm: account.sight && account.sight.size_ppm
         }
       end
 
@@ -48,7 +48,7 @@ defmodule Sim.Trial.Evaluation do
       robots: robots,
       leader: leader,
       epoch: run.run_log.epoch,
-      formation: formation(run, leader),
+      formation: shape.formation,
       error: error(robots),
       formed?: RunLog.formed?(run.run_log),
       estop: run.run_log.estop,
@@ -61,7 +61,7 @@ defmodule Sim.Trial.Evaluation do
   def result(run) do
     scene = scene(run)
     leader = scene.leader
-    slots = slots(run, leader)
+    slots = shape(run, leader).slots
     {mean, max} = scene.error || {nil, nil}
     {kind, spacing} = scene.formation
 
@@ -106,7 +106,7 @@ defmodule Sim.Trial.Evaluation do
   @spec worst(run(), leader :: atom()) :: float() | nil
   def worst(run, leader) do
     errors =
-      for {id, {_place, slot}} <- slots(run, leader),
+      for {id, {_place, slot}} <- shape(run, leader).slots,
           is_map_key(run.claims, id),
           do: Pose.distance(World.truth(run.world, id), slot)
 
@@ -118,11 +118,14 @@ defmodule Sim.Trial.Evaluation do
   def followers(run) do
     leader = RunLog.leader(run.run_log)
 
-    for {id, {_place, slot}} <- slots(run, leader), claim = run.claims[id], claim != nil do
+    for {id, {_place, slot}} <- shape(run, leader).slots, claim = run.claims[id], claim != nil do
       error_m = Pose.distance(World.truth(run.world, id), slot)
-      %{id: id, claim: claim, error_m: error_m, slot: slot}
+      %{id: id, under_way?: under_way?(run.run_log, claim), error_m: error_m, slot: slot}
     end
   end
+
+  # It claims neither to be in place, nor to be blocked, nor to be unsure of its place, and nobody has stopped it.
+  defp under_way?(log, claim), do: log.roles[RunLog.account(log, claim).state] == :follows
 
   defp row(robot, slot, claim) do
     %{
@@ -142,31 +145,16 @@ defmodule Sim.Trial.Evaluation do
     }
   end
 
-  # Slot number and true pose of each follower that the leader has in its order.
-  defp slots(_run, nil), do: %{}
-
-  defp slots(run, leader) do
-    case run.claims[leader] do
-      %{anchor: %Reference{} = anchor} ->
-        pose = World.truth(run.world, leader)
-        landmark = run.world.landmark
-        distance = if landmark, do: Pose.distance(pose, landmark), else: 1.6
-
-        anchor
-        |> SlotPoses.intended(pose, distance)
-        |> Enum.zip(anchor.order)
-        |> Map.new(fn {{place, slot}, id} -> {id, {place, slot}} end)
-
-      _no_anchor ->
-        %{}
-    end
+  # As the leader means it, where it truly stands.
+  defp shape(run, leader) do
+    none = %{formation: run.options.formation, slots: %{}}
+    claim = leader && run.claims[leader]
+    if claim, do: meant(run, World.truth(run.world, leader), claim) || none, else: none
   end
 
-  defp formation(run, leader) do
-    case leader && run.claims[leader] do
-      %{anchor: %{formation: formation}} -> formation
-      _none -> run.options.formation
-    end
+  defp meant(%{world: %{landmark: landmark}} = run, pose, claim) do
+    ahead_m = if landmark, do: Pose.distance(pose, landmark), else: 1.6
+    Robot.Mission.shape(run.run_log.mission, claim, pose, ahead_m)
   end
 
   defp error(robots) do
@@ -176,10 +164,16 @@ defmodule Sim.Trial.Evaluation do
     end
   end
 
-  @doc "What a robot does, in one word for people, by its claim; `nil` is that of one that is dead."
-  @spec state(map() | nil) :: atom()
-  def state(nil), do: :dead
-  # What keeps it from moving comes before what it would do.
-  def state(%{estop: _callers}), do: :estop
-  def state(claim), do: Claim.state(claim)
+  # What its claim says of a robot; `nil` is that of one that is dead.
+  defp account(run, claim), do: account_of(run.run_log.mission, claim)
+
+  @doc "What the claim of a robot on this mission says, for people: `state` is one word for what it does; `nil` is that of one that is dead."
+  @spec account_of(module() | nil, map() | nil) :: Robot.Mission.account()
+  def account_of(_mission, nil), do: %{state: :dead, says: [], sight: nil}
+
+  def account_of(mission, claim) do
+    account = Robot.Mission.account(mission, claim)
+    # What keeps it from moving comes before what it would do.
+    if is_map_key(claim, :estop), do: %{account | state: :estop}, else: account
+  end
 end

@@ -6,7 +6,8 @@ defmodule Sim.Trial.RunLog do
   alias Sim.Scene
   alias Sim.Trial.{AgreementMetrics, Claims, Stuck}
 
-  defstruct roles: %{},
+  defstruct mission: nil,
+            roles: %{},
             most: nil,
             stages: [],
             leader: nil,
@@ -32,12 +33,13 @@ defmodule Sim.Trial.RunLog do
         }
 
   @typedoc """
-  `roles` are those of the mission's phases and stages (`c:Robot.Mission.roles/0`); `most` is how many stages, claims, silences and
+  `roles` are those of the phases and stages (`c:Robot.Mission.roles/0`); `most` is how many stages, claims, silences and
   heals are kept (`nil`: all), and then stages have numbers; `stages` has the newest first; `leaders_at_once_max` counts leaders in the same part of the
   radio; `formed_ms` and `rest_ms` say since when the fleet has been in formation, or at rest
   without a landmark; `ticks` and `formed_ticks` count from the first election.
   """
   @type t :: %__MODULE__{
+          mission: module() | nil,
           roles: %{atom() => Robot.Mission.role()},
           most: pos_integer() | nil,
           stages: [stage()],
@@ -58,7 +60,8 @@ defmodule Sim.Trial.RunLog do
 
   @doc "An empty run log of a mission; of a run without an end with how much of it is kept."
   @spec new(module(), most :: pos_integer() | nil) :: t()
-  def new(mission, most \\ nil), do: %__MODULE__{roles: Robot.Mission.roles(mission), most: most}
+  def new(mission, most \\ nil),
+    do: %__MODULE__{mission: mission, roles: Robot.Mission.roles(mission), most: most}
 
   @doc "Records a stage; a search that others have already begun is not a new one."
   @spec stage(t(), integer(), atom(), atom() | nil, map()) :: t()
@@ -147,14 +150,20 @@ defmodule Sim.Trial.RunLog do
     %{run_log | claims: %{claims | told: newest(run_log, claims.told)}}
   end
 
-  defp role(run_log, claim), do: run_log.roles[claim[:phase]]
-
   @doc "The same tick for the invariant of `Sim.Trial.Stuck`; `rows` is called once a second."
   @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
   def watch(run_log, at_ms, rows) do
     stuck = Stuck.note(run_log.stuck, at_ms, rows)
     %{run_log | stuck: %{stuck | told: newest(run_log, stuck.told)}}
   end
+
+  @doc "What a robot that claims this does for its group (`c:Robot.Mission.roles/0`); `nil` for nothing."
+  @spec role(t(), claim :: map()) :: Robot.Mission.role() | nil
+  def role(run_log, claim), do: run_log.roles[claim[:phase]]
+
+  @doc "What such a claim says (`c:Robot.Mission.account/1`)."
+  @spec account(t(), claim :: map()) :: Robot.Mission.account()
+  def account(run_log, claim), do: Robot.Mission.account(run_log.mission, claim)
 
   @doc "The leader now; among several, the one of the highest epoch."
   @spec leader(t()) :: atom() | nil

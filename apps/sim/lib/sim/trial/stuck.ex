@@ -3,7 +3,8 @@ defmodule Sim.Trial.Stuck do
   Checks an invariant of every run from outside, by true poses: a follower that makes no progress
   says so. Pure; fed once a second.
 
-  A follower that claims neither to be in place, nor to be blocked, nor to be unsure of its place
+  A follower that is under way by its mission's account (`c:Robot.Mission.account/1`): it claims
+  neither to be in place, nor to be blocked, nor to be unsure of its place. It
   must have come nearer to its slot within 20 s, whatever shape the slot belongs to. The time starts
   again when the slot moves by more than a metre.
   """
@@ -15,10 +16,10 @@ defmodule Sim.Trial.Stuck do
 
   defstruct next_ms: 0, open: %{}, told: []
 
-  @typedoc "A follower under way: what it claims, its true error in metres, and its slot."
+  @typedoc "A follower: whether it claims to be under way, its true error in metres, and its slot."
   @type row :: %{
           id: atom(),
-          claim: map(),
+          under_way?: boolean(),
           error_m: float(),
           slot: Hal.Pose.t()
         }
@@ -35,7 +36,7 @@ defmodule Sim.Trial.Stuck do
 
   def note(stuck, at_ms, rows) do
     {open, told} =
-      for row <- rows.(), silent?(row.claim), reduce: {%{}, stuck.told} do
+      for row <- rows.(), row.under_way?, reduce: {%{}, stuck.told} do
         {open, told} ->
           state = go_on(stuck.open[row.id], row, at_ms)
           {state, told} = tell(state, row, at_ms, told)
@@ -48,9 +49,6 @@ defmodule Sim.Trial.Stuck do
   @doc "All violations up to now, the oldest first; a good run has none."
   @spec report(t()) :: [silence()]
   def report(stuck), do: Enum.reverse(stuck.told)
-
-  # A robot that was stopped claims nothing.
-  defp silent?(claim), do: Missions.Landmark.Claim.state(claim) == :follow
 
   defp go_on(nil, row, at_ms), do: begin(row, at_ms)
 

@@ -22,6 +22,15 @@ defmodule Sim.Scenario.NeverTest do
     def roles, do: %{lead: :leads, follow: :follows}
 
     @impl Robot.Mission
+    defdelegate account(claim), to: Missions.Landmark
+
+    @impl Robot.Mission
+    defdelegate shape(claim, pose, ahead_m), to: Missions.Landmark
+
+    @impl Robot.Mission
+    defdelegate place(mission, at_ms), to: Missions.Landmark
+
+    @impl Robot.Mission
     def init(robot, options), do: {:idle, %{me: robot, fault: options[:fault]}, []}
 
     @impl Robot.Mission

@@ -3,16 +3,14 @@ defmodule Sim.Trial.StuckTest do
   import Sim.TrialRuns
   alias Hal.Pose
   alias Sim.Trial
-  alias Sim.Trial.Stuck
+  alias Sim.Trial.{Evaluation, Stuck}
   @moduletag :slow
-
-  @claim %{phase: :follow, in_place: false, unsure: false, blocked: false}
 
   # One follower for `seconds`; `row` gives its error, and what differs, for a second.
   defp play(seconds, row) do
     Enum.reduce(0..seconds, %Stuck{}, fn s, stuck ->
       Stuck.note(stuck, s * 1000, fn ->
-        plain = %{id: :a, claim: @claim, error_m: 3.0, slot: Pose.new(0, 0)}
+        plain = %{id: :a, under_way?: true, error_m: 3.0, slot: Pose.new(0, 0)}
         [Map.merge(plain, row.(s))]
       end)
     end)
@@ -27,8 +25,30 @@ defmodule Sim.Trial.StuckTest do
   test "a robot that comes nearer, stands in place, is unsure, is blocked or leads is not recorded" do
     assert play(60, &%{error_m: 9.0 - &1 * 0.1}) == []
 
-    for claim <- [%{in_place: true}, %{unsure: true}, %{blocked: true}, %{phase: :lead}],
-        do: assert(play(60, fn _ -> %{claim: Map.merge(@claim, claim)} end) == [])
+    assert play(60, fn _ -> %{under_way?: false} end) == []
+
+    {:ok, trial} = Trial.new(%{seed: 1, blobs: :direct})
+    trial = trial |> Stream.iterate(&Trial.step/1) |> Enum.find(&(Trial.scene(&1).leader != nil))
+    trial = trial |> Trial.step() |> Trial.step()
+    claims = Map.new(Trial.claims(trial))
+    leader = Trial.scene(trial).leader
+
+    under_way? = fn more ->
+      claims =
+        for {id, claim} <- claims,
+            into: %{},
+            do: {id, if(id == leader, do: claim, else: Map.merge(claim, more))}
+
+      run = Map.merge(Map.take(trial, [:options, :world, :run_log]), %{claims: claims})
+      assert [_ | _] = rows = Evaluation.followers(run)
+      Enum.map(rows, & &1.under_way?) |> Enum.uniq()
+    end
+
+    follow = %{phase: :follow, in_place: false, unsure: false, blocked: false}
+    assert under_way?.(follow) == [true]
+
+    for more <- [%{in_place: true}, %{unsure: true}, %{blocked: true}, %{phase: :lead}],
+        do: assert(under_way?.(Map.merge(follow, more)) == [false])
   end
 
   test "another slot starts the time again, a trembling slot does not" do

@@ -67,9 +67,14 @@ defmodule Sim.Scenario.Check.Fleet do
 
   def judge({:says, who, word, _by}, view, _) do
     robots = View.who(view, who) -- if who == :all, do: [View.leader(view)], else: []
-    claims = for {id, claim} <- view.claims, id in robots, do: {id, claim}
-    so? = claims != [] and Enum.all?(claims, fn {_id, claim} -> claim[word] == true end)
-    reach(so?, fn _ -> Enum.map_join(claims, ", ", &says/1) end)
+
+    said =
+      for {id, claim} <- view.claims,
+          id in robots,
+          do: {id, RunLog.account(view.run_log, claim).says}
+
+    so? = said != [] and Enum.all?(said, fn {_id, words} -> word in words end)
+    reach(so?, fn _ -> Enum.map_join(said, ", ", &says/1) end)
   end
 
   defp reach(so?, figures), do: {:reach, so?, figures.(so?), nil}
@@ -107,10 +112,6 @@ defmodule Sim.Scenario.Check.Fleet do
 
   defp phases(view, robots), do: Enum.map_join(robots, ", ", &"#{&1} #{View.phase(view, &1)}")
 
-  defp says({id, claim}) do
-    case for word <- [:in_place, :unsure, :blocked], claim[word] == true, do: word do
-      [] -> "#{id} says nothing of its place"
-      words -> "#{id} says #{Enum.join(words, " and ")}"
-    end
-  end
+  defp says({id, []}), do: "#{id} says nothing of its place"
+  defp says({id, words}), do: "#{id} says #{Enum.join(words, " and ")}"
 end
