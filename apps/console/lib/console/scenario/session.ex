@@ -6,7 +6,6 @@ defmodule Console.Scenario.Session do
   alias Console.Scenario.{Options, Recording, Report}
   alias Sim.{Scenario, Scene, Trial}
   alias Sim.Scenario.Runner
-  alias Sim.Trial.RunLog
 
   @doc """
   Reads all files before the first run. The status is 0 if all expectations hold, else 2; an error
@@ -113,9 +112,9 @@ defmodule Console.Scenario.Session do
     now_ms = Hal.Clock.now_ms()
     view = %{output: output, quiet: options.quiet, told: 0, drawn_ms: now_ms}
 
-    shown = fn %{at_ms: at_ms, run_log: log}, checks, view ->
+    shown = fn at_ms, stages, checks, view ->
       view
-      |> news(RunLog.stages(log))
+      |> news(stages)
       |> draw(at_ms / 1000, Scenario.duration_s(scenario), checks)
     end
 

@@ -7,11 +7,13 @@ defmodule Sim.Scenario.Live do
   """
   alias Sim.{Fleet, Invariants, Scenario}
   alias Sim.Scenario.{Check, Runner, View}
+  alias Sim.Trial.RunLog
 
   @look_ms 100
 
-  @typedoc "Shows a look: the fleet, the checks, and what the last call returned."
-  @type shown :: (Fleet.moment(), [Check.t()], term() -> term())
+  @typedoc "Shows a look: its time, what has happened to the fleet so far, the checks, and what the last call returned."
+  @type shown ::
+          (at_ms :: integer(), [Sim.Scene.stage()], [Check.t()], view :: term() -> term())
 
   @doc """
   A whole run: its report, how long it took in seconds, and the verdicts in the order of the expectations. `shown` is called at each look, at first with
@@ -20,7 +22,11 @@ defmodule Sim.Scenario.Live do
   @spec run(Scenario.t(), view :: term(), shown()) ::
           {:ok, result :: map(), at_s :: float(), [Check.verdict()]}
           | {:error, line :: String.t()}
-  def run(%Scenario{} = scenario, view \\ nil, shown \\ fn _moment, _checks, view -> view end) do
+  def run(
+        %Scenario{} = scenario,
+        view \\ nil,
+        shown \\ fn _at_ms, _stages, _checks, view -> view end
+      ) do
     with {:ok, fleet} <- Fleet.start_link(Scenario.trial(scenario)) do
       try do
         judge = Invariants.new(Fleet.moment(fleet))
@@ -42,7 +48,7 @@ defmodule Sim.Scenario.Live do
     seen = moment |> Map.delete(:faults) |> View.of()
     judge = Invariants.watch(run.judge, moment)
     checks = Enum.map(run.checks, &Check.tick(&1, seen, judge))
-    view = shown.(moment, checks, view)
+    view = shown.(moment.at_ms, RunLog.stages(moment.run_log), checks, view)
     run = %{run | judge: judge, checks: checks}
 
     cond do

@@ -20,9 +20,17 @@ defmodule Sim.Scenario.LiveTest do
         ]
       )
 
-    shown = fn moment, checks, seen -> [{moment.at_ms, length(checks)} | seen] end
-    assert {:ok, result, at_s, verdicts} = Scenario.Live.run(scenario, [], shown)
+    test = self()
+
+    shown = fn at_ms, stages, checks, looks ->
+      send(test, {:look, looks, at_ms, length(stages), length(checks)})
+      looks + 1
+    end
+
+    assert {:ok, result, at_s, verdicts} = Scenario.Live.run(scenario, 1, shown)
     assert at_s >= 5.0
+    assert_received {:look, 40, at_ms, count, 6}
+    assert at_ms >= 4_000 and count >= 3
     stages = for stage <- result.stages, do: {stage.stage, stage.robot}
     assert {:told, :mag69} in stages and {:frozen, :mag69} in stages
 
