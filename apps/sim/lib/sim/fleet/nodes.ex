@@ -283,8 +283,7 @@ defmodule Sim.Fleet.Nodes do
        mission: setup.mission,
        plan: setup.plan,
        folder: backend.host.home,
-       loss: options.loss,
-       seed: options.seed + index
+       radio: %{options | seed: options.seed + index}
      }}
   end
 end
