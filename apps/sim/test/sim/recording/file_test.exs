@@ -63,6 +63,31 @@ defmodule Sim.Recording.FileTest do
     assert String.ends_with?(File.read!(path), Mcap.magic())
   end
 
+  # A pipe that nothing empties is such a disk.
+  test "a disk that hangs is told after a second, with the file, and the recording is whole", %{
+    tmp_dir: folder
+  } do
+    [pipe, path] = for name <- ~w(pipe.mcap run.mcap), do: Path.join(folder, name)
+    {_said, 0} = System.cmd("mkfifo", [pipe])
+    # The first opening makes the file, the second writes it.
+    script = ~S(exec 3<"$1"; read go; cat <&3 >"$2")
+    sh = [:binary, :exit_status, args: ["-c", script, "sh", pipe, path]]
+    reader = Port.open({:spawn_executable, "/bin/sh"}, sh)
+
+    said =
+      ExUnit.CaptureIO.capture_io(:stderr, fn ->
+        writer = Task.async(fn -> write(pipe, 60) end)
+        assert Task.yield(writer, 1_500) == nil
+        Port.command(reader, "go\n")
+        assert {:ok, _setup, _trial} = Task.await(writer, 30_000)
+      end)
+
+    assert said =~ "#{pipe}: its disk does not answer; the run waits for it"
+    assert_receive {^reader, {:exit_status, 0}}, 10_000
+    assert {:ok, %{whole?: true} = file} = Recording.File.open(path)
+    assert Recording.File.last_ms(file) == 6_000
+  end
+
   test "a file that was cut is read as far as it is whole", %{tmp_dir: folder} do
     path = Path.join(folder, "run.mcap")
     {:ok, _setup, _trial} = write(path, 50)
