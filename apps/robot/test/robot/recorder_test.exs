@@ -39,7 +39,7 @@ defmodule Robot.RecorderTest do
 
   defp replayed(path) do
     {:ok, file} = Recording.File.open(path)
-    {replay, differences} = Recording.File.replay(file)
+    {replay, differences} = replay(file)
     {file, Map.new(Replay.counts(replay)), differences}
   end
 

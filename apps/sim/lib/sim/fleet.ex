@@ -110,10 +110,6 @@ defmodule Sim.Fleet do
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
 
-  @doc "The server of its world; `nil` while it is being started again."
-  @spec server(GenServer.server()) :: pid() | nil
-  def server(fleet), do: GenServer.call(fleet, :server)
-
   @doc """
   Why the run has ended before its time, in one line, such as a world that ends again and again;
   `nil` as long as it has not. What was known then can still be asked.
@@ -181,7 +177,6 @@ defmodule Sim.Fleet do
 
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
   def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
-  def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
   def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
 
   def handle_call(:ended, _from, %{ended: nil} = s), do: {:reply, nil, s}

@@ -147,9 +147,6 @@ defmodule Sim.Fleet.Local do
   def world(backend), do: World.Server.world(backend.server)
 
   @impl Sim.Fleet.Backend
-  def server(backend), do: backend.server
-
-  @impl Sim.Fleet.Backend
   def messages(backend), do: RadioServer.counts(backend.air)
 
   @impl Sim.Fleet.Backend
