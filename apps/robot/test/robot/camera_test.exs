@@ -1,6 +1,6 @@
 defmodule Robot.CameraTest do
   @moduledoc "What the robot sees, and that it drives on when it does not."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   @moduletag :realtime
   @moduletag :capture_log
 

@@ -1,6 +1,6 @@
 defmodule Robot.DepartureTest do
   @moduledoc "A robot that has left its start pose, and what is started again on the way."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   @moduletag :realtime
   doctest Robot.Departure
   alias Hal.{Odometry, Pose, Profile}

@@ -1,6 +1,6 @@
 defmodule Robot.HostTest do
   @moduledoc "What a role does not know changes nothing, and is counted."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   @moduletag :realtime
 
   @roles [:gate, :executive, :pilot]

@@ -1,6 +1,6 @@
 defmodule Robot.RecorderTest do
   @moduledoc "Robots of processes, recorded and replayed; and what a recorder that fails does to a robot."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   alias Mcap.FileWriter.Folder
   alias Robot.{Recorder, Recording, Replay}
   alias Robot.Recorder.Queue

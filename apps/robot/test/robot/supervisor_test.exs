@@ -1,6 +1,6 @@
 defmodule Robot.SupervisorTest do
   @moduledoc "Who falls, and what happens: each row of the architecture's table within one robot."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   @moduletag :realtime
   @moduletag :capture_log
   import ExUnit.CaptureLog

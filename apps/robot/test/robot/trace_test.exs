@@ -1,6 +1,6 @@
 defmodule Robot.TraceTest do
   @moduledoc "What the processes do is what the functions say: recorded inputs, fed to both."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   alias Hal.{Odometry, Pose}
   alias Robot.Role
   @moduletag :realtime

@@ -18,7 +18,7 @@ defmodule Robot.Case do
   end
 
   setup do
-    # In the umbrella one VM runs the tests of all apps, and a fleet may be running already.
+    # That of this app's own suite runs all the time.
     if Process.whereis(Names) == nil, do: start_supervised!(Names)
     :ok
   end

@@ -26,9 +26,14 @@ defmodule Sim.ExploreTest do
     assert says =~ ~r/^says that \d+ m² are explored/
   end
 
-  @tag :slow
-  test "four know together what each has seen, although every fifth message is lost, and one dies" do
-    robots = [:mag1, :mag2, :min1, :min2]
+  for {robots, tags} <- [{3, []}, {4, [long: true]}] do
+    @tag tags
+    @tag :slow
+    test "#{robots} know together what each has seen, although every fifth message is lost, and one dies",
+      do: together(Enum.take([:mag1, :mag2, :min1, :min2], unquote(robots)))
+  end
+
+  defp together(robots) do
     trial = [robots: robots, seed: 2, loss: 0.2, kills: [{:mag2, 30}]] |> trial() |> run()
     assert Trial.formed?(trial)
     areas = for id <- Trial.living(trial), do: SharedMap.area(map(trial, id))
@@ -56,12 +61,20 @@ defmodule Sim.ExploreTest do
     path <> ":12x10"
   end
 
-  @tag :slow
-  @tag :tmp_dir
-  test "walls of few echoes that close a lane are looked at, and it does not say that all is explored where it is not",
-       %{tmp_dir: folder} do
+  for {runs, tags} <- [{[{1.2, 1}, {1.0, 2}], []}, {[{1.2, 3}, {1.0, 4}], [long: true]}] do
+    @tag tags
+    @tag :slow
+    @tag :tmp_dir
+    test(
+      "walls of few echoes that close a lane are looked at, and it does not say that all is explored where it is not, #{inspect(runs)}",
+      %{tmp_dir: folder},
+      do: few_echoes(folder, unquote(runs))
+    )
+  end
+
+  defp few_echoes(folder, runs) do
     shares =
-      for {metres, seed} <- [{1.2, 1}, {1.2, 3}, {1.0, 2}, {1.0, 4}] do
+      for {metres, seed} <- runs do
         map = lanes(Path.join(folder, "lanes#{metres}.pgm"), metres)
         begun = trial(robots: [:mag1], seed: seed, map: map, duration_s: 600)
         start = Hal.Pose.point(begun.world.robots[:mag1].pose)

@@ -1,6 +1,6 @@
 defmodule Robot.Safety.ArmingTest do
   @moduledoc "What was wished before wheels were disarmed is gone: arming starts nothing, whoever arms."
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   alias Hal.Device
   @moduletag :realtime
   @moduletag :capture_log

@@ -1,5 +1,5 @@
 defmodule Robot.Safety.DryRunTest do
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   import ExUnit.CaptureLog
   alias Robot.Safety.DryRun
   @moduletag :realtime

@@ -1,5 +1,5 @@
 defmodule Robot.Safety.GateTest do
-  use Robot.Case, async: false
+  use Robot.Case, async: true
   @moduletag :realtime
   @moduletag :capture_log
 

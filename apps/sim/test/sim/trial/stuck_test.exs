@@ -67,12 +67,19 @@ defmodule Sim.Trial.StuckTest do
 
   # Two rooms with a door of 1.6 m between them. Robots twitched before the wall, came no nearer for up to 29 s, and said
   # `follow`: a twitch counted as progress, and so did a shape that closed up and left their places where they were.
-  @tag :tmp_dir
-  test "a robot that twitches is told as stuck", %{tmp_dir: folder} do
+  for {seeds, tags} <- [{[5], []}, {[1, 10], [long: true]}] do
+    @tag tags
+    @tag :tmp_dir
+    test("a robot that twitches is told as stuck, seeds #{inspect(seeds)}", %{tmp_dir: folder},
+      do: twitches(folder, unquote(seeds))
+    )
+  end
+
+  defp twitches(folder, seeds) do
     path = Path.join(folder, "flat.pgm")
     File.write!(path, flat())
 
-    for seed <- [1, 5, 10] do
+    for seed <- seeds do
       result = Trial.result(run(%{map: "#{path}:16x12", landmark: {2.0, 1.5}, seed: seed}))
       assert result.stuck == []
       for robot <- result.fleet, robot.state == :blocked, do: assert(robot.blocked_by != nil)

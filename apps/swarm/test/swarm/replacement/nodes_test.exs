@@ -1,7 +1,8 @@
 defmodule Swarm.Replacement.NodesTest do
-  @moduledoc "Robots on nodes of their own, and a person on a node without one."
-  use Swarm.Case, async: false
-  alias Swarm.{Cluster, MeshNodes, StandMission, Versions}
+  @moduledoc "Robots on nodes of their own, and a person on a node without one. Nothing of this VM is shared."
+  use ExUnit.Case, async: true
+  import Swarm.Case, only: [eventually: 1, order: 1]
+  alias Swarm.{MeshNodes, StandMission, Versions}
   alias Swarm.MeshNodes.Wheels
   @moduletag :realtime
   @moduletag :cluster
@@ -59,6 +60,15 @@ defmodule Swarm.Replacement.NodesTest do
 
     says(one, "version 1")
   end
+end
+
+defmodule Swarm.Replacement.KeyTest do
+  @moduledoc "A node that is connected, and has a key of its own."
+  use Swarm.Case, async: false
+  alias Swarm.{Cluster, StandMission}
+  @moduletag :realtime
+  @moduletag :cluster
+  @moduletag :capture_log
 
   test "a node with another key is refused, although it is connected" do
     # Without a mesh each node has a key of its own.
