@@ -260,7 +260,7 @@ defmodule Robot.ReplayTest do
     for {version, more} <- [{2, [%{}]}, {99, [[], <<>>, 1]}] do
       message = List.to_tuple([:convoy_robots, version | more])
 
-      assert {:error, "is a recording of version #{version}; this program reads version 3"} ==
+      assert {:error, "is a recording of version #{version}; this program reads version 4"} ==
                Recording.read_robots(:erlang.term_to_binary(message))
     end
 
