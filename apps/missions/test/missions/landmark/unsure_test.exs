@@ -96,6 +96,11 @@ defmodule Missions.Landmark.UnsureTest do
     assert %{unsure?: false, progress: %{blocked?: true}} = stand(0.6, 0.62, 16)
   end
 
+  test "one on its way that knows its place less well than to a metre is unsure" do
+    assert %{unsure?: false} = watch(&(6.0 - 0.2 * &1), 0.9, 1)
+    assert %{unsure?: true} = watch(&(6.0 - 0.2 * &1), 1.1, 1)
+  end
+
   test "heartbeats carry the word unsure, and no other value in its place" do
     claim = %{phase: :follow, unsure: true}
     beat = Heartbeat.new({1, 1}, percept([]), {Landmark, claim}, [], EStop.State.new())
