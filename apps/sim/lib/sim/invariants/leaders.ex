@@ -11,7 +11,7 @@ defmodule Sim.Invariants.Leaders do
   | `not_together` | in a part with a leader, all follow it, in its epoch |
   | `no_leader` | a part of which somebody has seen the landmark in the last 10 s has a leader |
 
-  How long each may take follows from the table of times in docs/architecture.md. The clock of a part
+  How long each may take follows from docs/times.md. The clock of a part
   starts again when a robot joins or leaves it.
 
   | | without loss | why |

@@ -7,7 +7,7 @@ defmodule Sim.Invariants.Slots do
   | `bad_anchor` | the places that a leader gives to others are valid (`c:Robot.Mission.place/2`) |
   | `same_slot` | robots do not take the same slot (`c:Robot.Mission.place/2`), as followers of one leader and epoch with a fresh reference |
 
-  An anchor is good for 1 s (docs/architecture.md, table of times), and a follower without a fresh one
+  An anchor is good for 1 s (docs/times.md), and a follower without a fresh one
   stands. So two followers may for 1 s, and for as long as letters are under way, believe a newer and an
   older order. The loss of messages does not make that longer: an anchor grows old by itself.
   """

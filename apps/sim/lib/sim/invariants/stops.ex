@@ -4,7 +4,7 @@ defmodule Sim.Invariants.Stops do
   #
   # `stop_lost`: a stop that holds one robot of a part of the radio holds all of that part, but those
   # that a person has reset since. Heartbeats carry it at 5 Hz, so it is given 2 s, the time after which
-  # a robot from which nothing comes is gone (docs/architecture.md), divided by (1 - loss)^2.
+  # a robot from which nothing comes is gone (docs/times.md), divided by (1 - loss)^2.
   alias Sim.Invariants.Leaders
   alias Sim.Invariants.Violation
   alias Swarm.EStop

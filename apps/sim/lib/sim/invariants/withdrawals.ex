@@ -4,7 +4,7 @@ defmodule Sim.Invariants.Withdrawals do
   # withdraw it. Pure; fed every 100 ms.
   #
   # `Sim.Trial.Claims` looks again 5 s after a claim was made. A leader withdraws a claim when not all have
-  # been in place for 0.5 s (docs/architecture.md, table of times), and hears of it by a heartbeat, which
+  # been in place for 0.5 s (docs/times.md), and hears of it by a heartbeat, which
   # comes every 0.2 s and may be under way for a while. A claim that is withdrawn within that time after
   # it was looked at again was no longer true then, and known not to be.
 
