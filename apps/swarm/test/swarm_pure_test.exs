@@ -1,5 +1,6 @@
 defmodule SwarmPureTest do
   use ExUnit.Case, async: true
+  doctest Swarm.Commands.Client, only: [refusals: 2]
   doctest Swarm.Formation
   doctest Swarm.Formation.Assignment
   doctest Swarm.Formation.Chain

@@ -1,7 +1,6 @@
 defmodule Console.TerminalTest do
   use ExUnit.Case, async: true
-  alias Console.{Runs, Terminal}
-  alias Console.Picture.MapView
+  alias Console.{FakeTrial, Runs, Terminal}
   alias Console.Terminal.{Canvas, Editor, Style}
 
   doctest Console
@@ -147,7 +146,7 @@ defmodule Console.TerminalTest do
 
   test "the walls are shown all around, whatever the screen size" do
     scene = Runs.scene("", 1)
-    room = MapView.room("hall", 18.0, 18.0)
+    room = FakeTrial.room("hall", 18.0, 18.0)
 
     for {columns, rows} <- [{41, 16}, {38, 16}, {80, 30}, {84, 27}] do
       row = Canvas.floor(nil, room, scene, columns, rows).walls |> Map.keys()
@@ -167,7 +166,7 @@ defmodule Console.TerminalTest do
 
   test "the floor is made once as long as nothing changes" do
     scene = Runs.scene("", 1)
-    room = MapView.room("hall", 16.0, 12.0)
+    room = FakeTrial.room("hall", 16.0, 12.0)
     floor = Canvas.floor(nil, room, scene, 40, 15)
     assert Canvas.floor(floor, room, scene, 40, 15) == floor
     refute Canvas.floor(floor, room, scene, 50, 15) == floor
@@ -175,7 +174,7 @@ defmodule Console.TerminalTest do
 
   test "on a floor too large for the screen only the fleet's part is shown" do
     scene = Runs.scene("", 1)
-    floor = Canvas.floor(nil, MapView.room("huge", 300.0, 200.0), scene, 40, 15)
+    floor = Canvas.floor(nil, FakeTrial.room("huge", 300.0, 200.0), scene, 40, 15)
     assert floor.scale < 1.0
   end
 

@@ -96,7 +96,7 @@ defmodule Console.FakeTrial do
   def scene(trial) do
     %Scene{
       at_ms: trial.at_ms,
-      map: Console.Picture.MapView.room(trial.options.map, 16.0, 12.0),
+      map: room(trial.options.map, 16.0, 12.0),
       robots: trial.robots,
       landmark: trial.landmark,
       leader: trial.leader,
@@ -294,4 +294,10 @@ defmodule Console.FakeTrial do
 
   defp happened(trial, stage),
     do: %{trial | stages: trial.stages ++ [Map.put(stage, :at_s, trial.at_ms / 1000)]}
+
+  @doc "An empty room with walls of 0.2 m."
+  def room(name, width, height) do
+    wall? = fn x, y -> abs(x) > width / 2 - 0.2 or abs(y) > height / 2 - 0.2 end
+    %Console.Picture.MapView{name: name, width: width, height: height, wall?: wall?}
+  end
 end

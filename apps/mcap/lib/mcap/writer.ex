@@ -88,10 +88,6 @@ defmodule Mcap.Writer do
   @spec drop(t()) :: t()
   def drop(t), do: %{t | chunk: %Chunk{}}
 
-  @doc "How many bytes the open chunk has; 0 when there is none."
-  @spec open_bytes(t()) :: non_neg_integer()
-  def open_bytes(t), do: t.chunk.bytes
-
   @doc "How many bytes were handed out so far."
   @spec bytes(t()) :: non_neg_integer()
   def bytes(t), do: t.offset

@@ -52,16 +52,16 @@ defmodule Mcap.WriterTest do
     {t, _head} = Writer.new(chunk_bytes: 500, chunk_ns: 10 * @ms)
     {id, t} = Writer.channel(t, "/a", "text", nil)
     {t, out} = record(t, id, 3)
-    assert IO.iodata_length(out) == 0 and Writer.open_bytes(t) in 393..499
+    assert IO.iodata_length(out) == 0 and t.chunk.bytes in 393..499
     {full, _out} = record(t, id, 1)
-    assert Writer.open_bytes(full) == 0
+    assert full.chunk.bytes == 0
 
     {in_time, []} = Writer.message(t, id, 11 * @ms - 1, "")
-    assert Writer.open_bytes(in_time) == Writer.open_bytes(t) + 31
+    assert in_time.chunk.bytes == t.chunk.bytes + 31
     {late, closed} = Writer.message(t, id, 11 * @ms, "")
     assert <<0x06, _::binary>> = IO.iodata_to_binary(closed)
     # The channel's record once more, and the message.
-    assert Writer.open_bytes(late) < 31 + 50
+    assert late.chunk.bytes < 31 + 50
   end
 
   test "the same messages give the same bytes, and finish_bytes is enough" do

@@ -11,7 +11,7 @@ defmodule Robot.Lockstep do
   | what a role that hangs is told waits; after 2 s it is killed | `hang/4`, `wake/2` |
 
   What devices, other robots and people notice is returned. What is for a role that is not among them is lost, as is what
-  comes later by a timer (`:after`).
+  comes later by a timer (`:after`): by it roles answer people in the place of a drive or a disk that does not answer, and here is neither.
   """
   alias Hal.Twist
   alias Robot.{Board, Role}

@@ -37,7 +37,7 @@ defmodule Robot.Recorder do
   @doc """
   Starts it. Options: `robots` (ids), `file` (options of `Mcap.FileWriter`), `pictures` of their
   cameras a second (`nil`: none); for tests `bound`, of
-  the entries under way, and `again_ms`, until a folder is tried again. It starts even if the file cannot be made (`status/1`).
+  the entries under way, `again_ms`, until a folder is tried again, and `given_up_ms`, until a disk that hangs is given up. It starts even if the file cannot be made (`status/1`).
   """
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, Map.new(options))
@@ -93,6 +93,7 @@ defmodule Robot.Recorder do
     s = %{
       ids: ids,
       again_ms: Map.get(options, :again_ms, @again_ms),
+      given_up_ms: Map.get(options, :given_up_ms, @given_up_ms),
       file: file,
       queues: queues,
       robots: Map.new(ids, &{&1, %{offset_ms: nil, profile: nil}}),
@@ -112,7 +113,8 @@ defmodule Robot.Recorder do
       unix_ms: System.os_time(:millisecond) - now_ms,
       asked_ms: now_ms,
       tried_ms: now_ms,
-      since_ms: now_ms
+      # Until the writer must have answered what it was asked.
+      timer: nil
     }
 
     case Enum.find_value(queues, :ok, &registered/1) do
@@ -169,10 +171,13 @@ defmodule Robot.Recorder do
   end
 
   def handle_info(:write, s),
-    do: {:noreply, s |> hangs() |> write() |> minute() |> again() |> later()}
+    do: {:noreply, s |> write() |> minute() |> again() |> later()}
+
+  def handle_info({:timeout, timer, :hangs}, %{timer: timer} = s) when timer != nil,
+    do: {:noreply, hangs(s)}
 
   def handle_info({:EXIT, writer, reason}, %{output: %Output{writer: writer}} = s),
-    do: {:noreply, fail(s, "the writer of its file has ended: #{inspect(reason)}")}
+    do: {:noreply, fail(s, of_file(s, "its writer has ended: #{inspect(reason)}"))}
 
   def handle_info({:EXIT, pictures, _reason}, %{pictures: pictures} = s) when pictures != nil do
     _ = Process.send_after(self(), :look, @again_ms)
@@ -184,7 +189,7 @@ defmodule Robot.Recorder do
   def handle_info(message, %{output: %Output{} = output} = s) do
     case Output.heard(output, message) do
       nil -> {:noreply, s}
-      news -> {:noreply, news(s, news)}
+      news -> {:noreply, s |> answered() |> news(news)}
     end
   end
 
@@ -263,8 +268,13 @@ defmodule Robot.Recorder do
     s
   end
 
-  defp open(s) do
-    %{s | output: Output.open(s.file, s.ids, s.rate != nil), since_ms: Hal.Clock.now_ms()}
+  defp open(s), do: asked(%{s | output: Output.open(s.file, s.ids, s.rate != nil)}, @hangs_ms)
+
+  defp asked(s, ms), do: %{s | timer: :erlang.start_timer(ms, self(), :hangs)}
+
+  defp answered(s) do
+    if s.timer, do: :erlang.cancel_timer(s.timer)
+    %{s | timer: nil}
   end
 
   defp news(s, {:open, output}) do
@@ -284,31 +294,26 @@ defmodule Robot.Recorder do
 
   # For the end of a file.
   defp settled(%{output: %Output{question: question} = output} = s) when question != nil,
-    do: news(s, Output.await(output))
+    do: s |> answered() |> news(Output.await(output))
 
   defp settled(s), do: s
 
-  defp hangs(%{output: %Output{question: question}} = s) when question != nil do
-    case Hal.Clock.now_ms() - s.since_ms do
-      ms when ms >= @given_up_ms -> fail(s, "its disk has not answered for #{div(ms, 1_000)} s")
-      ms when ms >= @hangs_ms and s.slow == nil -> slow(s, "its disk does not answer")
-      _soon -> s
-    end
-  end
-
-  defp hangs(s), do: s
-
-  defp slow(s, line) do
-    line = "#{s.file[:path]}: #{line}"
+  defp hangs(%{slow: nil} = s) do
+    line = of_file(s, "its disk does not answer")
     tell(s, :failed, %{line: line})
-    %{s | slow: line}
+    asked(%{s | slow: line}, s.given_up_ms - @hangs_ms)
   end
+
+  defp hangs(s),
+    do: fail(s, of_file(s, "its disk has not answered for #{div(s.given_up_ms, 1_000)} s"))
+
+  defp of_file(s, line), do: "#{s.file[:path]}: #{line}"
 
   # The first error is told, and its successors only when it was over meanwhile.
   defp fail(s, line) do
     if s.failed == nil, do: tell(s, :failed, %{line: line})
     if s.output, do: Output.abandon(s.output)
-    s = taken(s, s.owed)
+    s = s |> answered() |> taken(s.owed)
 
     %{
       s
@@ -334,11 +339,11 @@ defmodule Robot.Recorder do
   defp write(%{output: %Output{question: question}} = s) when question != nil, do: s
 
   defp write(s) do
-    now_ms = Hal.Clock.now_ms()
-    ns = (now_ms + s.unix_ms) * 1_000_000
+    ns = (Hal.Clock.now_ms() + s.unix_ms) * 1_000_000
     {entries, shots} = {Enum.reverse(s.entries), Enum.reverse(s.shots)}
     output = Output.write(s.output, entries, shots, s.robots, ns)
-    %{s | output: output, sent: s.count, entries: [], count: 0, shots: [], since_ms: now_ms}
+    s = %{s | output: output, sent: s.count, entries: [], count: 0, shots: []}
+    asked(s, @hangs_ms)
   end
 
   defp closed(%{output: nil, failed: nil}), do: :ok

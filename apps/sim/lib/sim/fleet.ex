@@ -40,7 +40,7 @@ defmodule Sim.Fleet do
     backend = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
-         :ok <- unscripted(setup.options, backend),
+         :ok <- possible(setup.options, backend),
          {:ok, setup, begin?} <-
            Mission.choose(setup, Map.get(own, :mission, true), backend == Nodes),
          :ok <- free(setup.options.robots) do
@@ -59,14 +59,16 @@ defmodule Sim.Fleet do
     end
   end
 
-  # Processes of their own are frozen, cut off and killed by other means (`bin/soak`).
-  defp unscripted(%{script: [], cuts: []}, _backend), do: :ok
-  defp unscripted(_options, Local), do: :ok
+  defp possible(%{casts: :drawn}, _backend),
+    do: {:error, "casts: :drawn is for runs in lockstep; processes hear each other as they are"}
 
-  defp unscripted(_options, _nodes) do
+  # Processes of their own are frozen, cut off and killed by other means (`bin/soak`).
+  defp possible(options, Nodes) when options.script != [] or options.cuts != [] do
     {:error,
      "robots in processes of their own take no script and no cuts: only those on one node do"}
   end
+
+  defp possible(_options, _backend), do: :ok
 
   @doc "The current scene for viewers."
   @spec scene(GenServer.server()) :: Scene.t()
@@ -107,10 +109,6 @@ defmodule Sim.Fleet do
   @doc "The robots that live, in the order of the fleet."
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
-
-  @doc "The server of its world; `nil` while it is being started again."
-  @spec server(GenServer.server()) :: pid() | nil
-  def server(fleet), do: GenServer.call(fleet, :server)
 
   @doc """
   Why the run has ended before its time, in one line, such as a world that ends again and again;
@@ -170,14 +168,15 @@ defmodule Sim.Fleet do
 
   def handle_call(:moment, _from, s) do
     claims = ask(s, :claims)
-    ids = for {id, _claim} <- claims, do: id
-    more = %{claims: claims, phases: phases(claims), parts: parts(s) || [ids], faults: s.faults}
+    said = Faults.awake(s.faults, claims, now(s))
+    ids = Keyword.keys(said)
+    phases = for {id, _claim} <- claims, into: %{}, do: {id, phase(said, id)}
+    more = %{claims: said, phases: phases, parts: parts(s, ids) || [ids], faults: s.faults}
     {:reply, s |> run() |> Map.delete(:messages) |> Map.merge(more), s}
   end
 
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
   def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
-  def handle_call(:server, _from, s), do: {:reply, ask(s, :server), s}
   def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
 
   def handle_call(:ended, _from, %{ended: nil} = s), do: {:reply, nil, s}
@@ -220,14 +219,28 @@ defmodule Sim.Fleet do
   def handle_info(:tick, s) do
     now = now(s)
     claims = ask(s, :claims)
+    heard = Faults.awake(s.faults, claims, now)
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
-    {told, said} = Said.look(s.said, claims, s.run_log.roles)
-    run_log = s.run_log |> RunLog.note(now, claims, parts(s)) |> RunLog.judge(now, claims, worst)
-    run_log = run_log |> RunLog.watch(now, followers) |> tell(now, told)
+    {told, said} = Said.look(s.said, heard, s.run_log.roles)
+    parts = parts(s, Keyword.keys(claims))
+
+    run_log =
+      s.run_log
+      |> RunLog.held(now, claims)
+      |> RunLog.note(now, heard, parts)
+      |> RunLog.judge(now, heard, worst)
+      |> RunLog.watch(now, followers)
+      |> tell(now, told)
+
     {events, script} = Script.due(s.script, now(s), RunLog.leader(run_log))
     s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
     {:noreply, s |> cut(now) |> schedule()}
+  end
+
+  def handle_info({:refused, command, refusals}, s) do
+    refused = for {id, why} <- refusals, do: {:order_refused, id, command, why}
+    {:noreply, Enum.reduce(refused, s, &told/2)}
   end
 
   def handle_info(message, %{backend: {module, backend}} = s) do
@@ -286,8 +299,11 @@ defmodule Sim.Fleet do
   defp change({:cut, what}, s), do: %{s | severed: s.severed ++ [{0, :end, what}]}
   defp change({:join}, s), do: %{s | severed: []}
 
-  defp change({:tell, to, command}, s),
-    do: order(s, to, Event.request(command, s.setup.options.robots))
+  defp change({:tell, to, command}, s) do
+    fleet = self()
+    refused = &send(fleet, {:refused, command, &1})
+    order(s, to, Event.request(command, s.setup.options.robots), refused)
+  end
 
   defp change({:estop, id}, s), do: order(s, id, :estop)
   defp change({:reset}, s), do: order(s, :all, :reset)
@@ -301,16 +317,17 @@ defmodule Sim.Fleet do
     if kind == :deaf, do: s, else: become(s, :suffer, [event])
   end
 
-  # A person's order: what the robots answer is for the person.
-  defp order(s, to, request) do
+  # A person's order: `refused` is called with those that do not accept it, and why.
+  defp order(s, to, request, refused \\ fn _refusals -> :ok end) do
     robots = if to == :all, do: ask(s, :living), else: [to]
     if request == :reset, do: Broadcaster.quiet(:all)
-    {:ok, _pid} = Task.start(fn -> Client.ask(robots, request) end)
+    ask = fn -> refused.(Client.refusals(robots, Client.ask(robots, request))) end
+    {:ok, _pid} = Task.start(ask)
     s
   end
 
   # What a robot claims says in which phase it is, but for one without a mission.
-  defp phases(claims), do: for({id, claim} <- claims, into: %{}, do: {id, claim[:phase] || :idle})
+  defp phase(said, id), do: if(claim = said[id], do: claim[:phase] || :idle, else: :frozen)
 
   # Puts into effect who is cut off from now on.
   defp cut(%{setup: %{options: options}} = s, now) do
@@ -321,10 +338,8 @@ defmodule Sim.Fleet do
     if ways == s.ways, do: s, else: become(%{s | ways: ways}, :radio, [{:cut_ways, ways}])
   end
 
-  defp parts(%{ways: []}), do: nil
-
-  defp parts(s),
-    do: [seed: 0] |> Radio.new() |> Radio.cut_ways(s.ways) |> Radio.parts(ask(s, :living))
+  defp parts(%{ways: []}, _ids), do: nil
+  defp parts(s, ids), do: [seed: 0] |> Radio.new() |> Radio.cut_ways(s.ways) |> Radio.parts(ids)
 
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 

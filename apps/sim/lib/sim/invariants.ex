@@ -92,9 +92,7 @@ defmodule Sim.Invariants do
   @doc "One tick: the trial after a step."
   @spec note(t(), Trial.t()) :: t()
   def note(judge, %Trial{at_ms: at_ms, world: world, run_log: log} = trial) do
-    # What a frozen robot claimed last is nothing that it says or does now.
-    frozen? = &Faults.any?(trial.faults, [:frozen], &1, at_ms - 1)
-    said = for {id, _claim} = row <- Trial.claims(trial), not frozen?.(id), do: row
+    said = Faults.awake(trial.faults, Trial.claims(trial), at_ms - 1)
     ids = for {id, _claim} <- said, do: id
     parts = Radio.parts(trial.radio, ids)
     stops = for id <- ids, into: %{}, do: {id, Member.role(trial.members[id], :estop).stop}
@@ -140,13 +138,11 @@ defmodule Sim.Invariants do
   agree on places, and how their wheels turn, is inside processes, or between two looks.
   """
   @spec watch(t(), Sim.Fleet.moment()) :: t()
-  def watch(judge, %{at_ms: at_ms, faults: faults, run_log: log} = moment) do
-    frozen? = &Faults.any?(faults, [:frozen], &1, at_ms - 1)
+  def watch(judge, %{at_ms: at_ms, run_log: log} = moment) do
     phases = Robot.Mission.phases(log.mission)
 
     claims =
       for {id, claim} <- moment.claims,
-          not frozen?.(id),
           do: {id, if(claim[:phase] in phases, do: known(claim, log), else: %{})}
 
     {led, leaders} = Leaders.note(judge.leaders, at_ms, claims, moment.parts)

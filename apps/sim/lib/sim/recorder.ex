@@ -6,7 +6,7 @@ defmodule Sim.Recorder do
 
   The run's times count from zero, so that a run from a seed gives the same file. A write that
   fails ends the recording, not the run, and what was written before stays whole; an ffmpeg that fails ends the pictures;
-  `close/1` says so. A disk that does not answer for a second is told on standard error, and the run waits for it.
+  `close/1` says so. A disk that does not answer for a second is told on standard error, and the run waits for it after 5 s of its time.
   """
   use GenServer
   alias Mcap.FileWriter.{Disk, Output}
@@ -35,7 +35,7 @@ defmodule Sim.Recorder do
 
     # Whether it can be opened is known before there is a process that would end for it.
     with :ok <- if(pictures?, do: able(path), else: :ok),
-         :ok <- Disk.named(patient(fn -> File.write(path, "") end), path),
+         :ok <- Disk.named(patient(path, fn -> File.write(path, "") end), path),
          do: GenServer.start_link(__MODULE__, {path, setup, pictures?}, spawn_opt: @room)
   end
 
@@ -55,20 +55,17 @@ defmodule Sim.Recorder do
     GenServer.cast(recorder, {:tick, tick, scene, frames})
 
     if rem(div(at_ms, 100), @ahead) == 0,
-      do: patient(fn -> GenServer.call(recorder, :reached, :infinity) end),
+      do: GenServer.call(recorder, :reached, :infinity),
       else: :ok
   end
 
-  # Waits for a disk, and says so if it takes long.
-  defp patient(function) do
-    task = Task.async(function)
-
-    with nil <- Task.yield(task, @hangs_ms) do
-      # The commands that record are silent in the log.
-      IO.puts(:stderr, "the disk of the recording does not answer; the run waits for it")
-      {:ok, Task.await(task, :infinity)}
-    end
-    |> then(fn {:ok, result} -> result end)
+  # Calls to a disk that may hang; the process that waits for it cannot say so. The commands that record are silent in the log.
+  defp patient(path, function) do
+    line = "#{path}: its disk does not answer; the run waits for it"
+    {:ok, timer} = :timer.apply_after(@hangs_ms, IO, :puts, [:stderr, line])
+    result = function.()
+    {:ok, :cancel} = :timer.cancel(timer)
+    result
   end
 
   @doc "Ends the recording; the error says in one line why it is not whole."
@@ -94,7 +91,7 @@ defmodule Sim.Recorder do
       blind: nil
     }
 
-    case Output.open(path, nil, library: "convoy", overwrite: true) do
+    case patient(path, fn -> Output.open(path, nil, library: "convoy", overwrite: true) end) do
       {:ok, output} -> {:ok, begin(%{s | output: output}, setup, pictures?)}
       {:error, line} -> {:ok, %{s | written: {:error, line}}}
     end
@@ -111,7 +108,7 @@ defmodule Sim.Recorder do
   def handle_call(:reached, _from, s), do: {:reply, :ok, s}
 
   def handle_call(:close, _from, s) do
-    s = took(s, s.output && Output.finish(s.output))
+    s = took(s, s.output && patient(s.path, fn -> Output.finish(s.output) end))
     :ok = Camera.close(s.camera)
     {:reply, with(:ok <- s.written, do: s.blind || :ok), %{s | output: nil, camera: nil}}
   end
@@ -144,9 +141,14 @@ defmodule Sim.Recorder do
   end
 
   defp flush(%{output: nil} = s, _at_ms), do: s
-  defp flush(s, at_ms), do: took(%{s | flushed_ms: at_ms}, Output.flush(s.output))
 
-  defp write(s, writer, bytes), do: took(s, Output.write(s.output, writer, bytes))
+  defp flush(s, at_ms),
+    do: took(%{s | flushed_ms: at_ms}, patient(s.path, fn -> Output.flush(s.output) end))
+
+  defp write(s, writer, []), do: took(s, Output.write(s.output, writer, []))
+
+  defp write(s, writer, bytes),
+    do: took(s, patient(s.path, fn -> Output.write(s.output, writer, bytes) end))
 
   defp took(s, nil), do: s
   defp took(s, {:ok, output}), do: %{s | output: output}

@@ -144,4 +144,28 @@ defmodule Sim.Scene do
   """
   @spec news([stage()], told :: non_neg_integer()) :: [stage()]
   def news(stages, told), do: Enum.take(stages, -max(told(stages) - told, 0))
+
+  @typedoc "The points at which something was, the newest first."
+  @type way :: [Pose.point()]
+
+  @doc "Each robot's way, with where it is now (`way/3`)."
+  @spec ways(%{atom() => way()}, t(), apart_m :: float()) :: %{atom() => way()}
+  def ways(ways, %__MODULE__{robots: robots}, apart_m) do
+    for %{id: id, pose: pose} <- robots, reduce: ways do
+      ways -> Map.put(ways, id, way(Map.get(ways, id, []), Pose.point(pose), apart_m))
+    end
+  end
+
+  @doc """
+  A way with a place, where that is so far from its last point; `nil` is no place.
+
+      iex> [] |> Sim.Scene.way({0.0, 0.0}, 0.5) |> Sim.Scene.way({0.1, 0.0}, 0.5) |> Sim.Scene.way({0.6, 0.0}, 0.5)
+      [{0.6, 0.0}, {0.0, 0.0}]
+  """
+  @spec way(way(), Pose.point() | nil, apart_m :: float()) :: way()
+  def way(way, nil, _apart_m), do: way
+  def way([], place, _apart_m), do: [place]
+
+  def way([newest | _] = way, place, apart_m),
+    do: if(Pose.distance(newest, place) < apart_m, do: way, else: [place | way])
 end

@@ -21,6 +21,7 @@ defmodule Sim.Trial do
     Termination
   }
 
+  alias Swarm.Commands.Client
   alias Swarm.Member
 
   @enforce_keys [:options, :map, :world, :radio, :members, :script, :run_log, :colours]
@@ -195,8 +196,21 @@ defmodule Sim.Trial do
 
   defp intervene(trial, event) do
     {trial, commands} = trial |> note(fn -> {:world, trial.at_ms, event} end) |> happen(event)
-    Enum.reduce(commands, trial, fn {to, command}, trial -> command(trial, to, command) end)
+
+    Enum.reduce(commands, trial, fn {to, command}, trial ->
+      {trial, answers} = ask(trial, to, command)
+      robots = if to == :all, do: living(trial), else: [to]
+      event |> refused(robots, answers) |> Enum.reduce(trial, &intervene(&2, &1))
+    end)
   end
+
+  # What a person hears who has told robots something.
+  defp refused({:tell, _to, command}, robots, answers) do
+    for {id, why} <- Client.refusals(robots, answers),
+        do: {:order_refused, id, command, why}
+  end
+
+  defp refused(_event, _robots, _answers), do: []
 
   @doc """
   An event of the script happens; also returns the commands to robots that are part of it,

@@ -19,7 +19,7 @@ defmodule Sim.FleetTest do
     fleet
   end
 
-  defp truth(fleet, id), do: fleet |> Fleet.server() |> World.Server.world() |> World.truth(id)
+  defp truth(fleet, id), do: World.truth(Fleet.moment(fleet).world, id)
   defp stages(fleet), do: Enum.map(Fleet.scene(fleet).stages, & &1.stage)
   defp stop(fleet), do: Fleet.stop(fleet)
 
@@ -121,7 +121,7 @@ defmodule Sim.FleetTest do
     still = fn -> for id <- ids, do: truth(fleet, id) end
 
     eventually(fn ->
-      Enum.all?(World.Server.world(Fleet.server(fleet)).robots, fn {_, body} ->
+      Enum.all?(Fleet.moment(fleet).world.robots, fn {_, body} ->
         body.speed == {0.0, 0.0}
       end)
     end)

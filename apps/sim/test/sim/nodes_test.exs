@@ -59,7 +59,7 @@ defmodule Sim.NodesTest do
 
     assert {:ended, line, backend} = Nodes.hear(backend, {port, {:exit_status, 137}})
     assert line == "world@127.0.0.1 has ended 6 times, last: Killed"
-    assert Nodes.server(backend) == nil
+    assert backend.children[:world] == nil
     assert Nodes.world(backend) == setup.world
   end
 

@@ -13,6 +13,7 @@ defmodule Sim.ReplayTest do
     {9, {:join}},
     {10, {:loss, 0.4}},
     {12, {:estop, :min1}},
+    {13, {:tell, :min1, "wander"}},
     {14, {:reset}},
     {15, {:tell, :all, :start}},
     {16, {:displace, :mag1, {-3.0, 2.0, 90}}}

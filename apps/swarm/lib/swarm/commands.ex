@@ -101,8 +101,7 @@ defmodule Swarm.Commands do
   @spec told([atom()], %{atom() => term()}) :: Swarm.answer() | {:ok, line :: String.t()}
   def told(robots, answers) do
     said = for id <- robots, {:ok, line} <- [answers[id]], do: line
-    accepted? = &(&1 == :ok or match?({:ok, _line}, &1))
-    refusals = for id <- robots, not accepted?.(answers[id]), do: refusal(id, answers[id])
+    refusals = for {_id, line} <- Commands.Client.refusals(robots, answers), do: line
 
     case {refusals, said} do
       {[], []} -> :ok
@@ -124,7 +123,7 @@ defmodule Swarm.Commands do
   def any_told(robots, answers) do
     {taken, others} = Enum.split_with(robots, &(answers[&1] == :ok))
     others = Enum.reject(others, &(answers[&1] == {:error, :no_formation}))
-    lines = others |> Enum.map(&refusal(&1, answers[&1])) |> Enum.uniq()
+    lines = Enum.uniq(for {_id, line} <- Commands.Client.refusals(others, answers), do: line)
 
     case {taken, lines} do
       {[_ | _], []} -> :ok
@@ -133,14 +132,6 @@ defmodule Swarm.Commands do
       {_taken, lines} -> {:error, Enum.join(lines ++ ["the others accepted it"], "; ")}
     end
   end
-
-  defp refusal(id, nil), do: "#{id} does not answer"
-  defp refusal(_id, {:error, line}) when is_binary(line), do: line
-
-  defp refusal(id, {:error, :no_formation}),
-    do: "#{id} is not on a mission that has a formation; start it first"
-
-  defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
 
   # The number of robots matters only for a whole length or side.
   defp fleet(options, robots) do

@@ -114,14 +114,14 @@ defmodule Soak.Deeds do
   @doc "Ends what lasts, and hears the answer to an e-stop."
   @spec end_of(State.t(), tuple()) :: State.t()
   # A node whose robot is being started again knows of none, and says so; then a person presses another one's.
-  def end_of(s, {{:estop_answer, from, others}, {:error, "the stop was sent, but no" <> _robot}}) do
+  def end_of(s, {{:estop_answer, from, others}, {:error, _line}, []}) do
     if s.judge.stops.order == nil,
       do: s,
       else: s |> State.note({now(), :soak, :estop_refused, from}) |> estop(others)
   end
 
   # Any other answer, also that somebody did not answer, is for the judge.
-  def end_of(s, {{:estop_answer, _from, _others}, _answer}), do: s
+  def end_of(s, {{:estop_answer, _from, _others}, _answer, _known}), do: s
 
   def end_of(s, {:thaw, robot, vm}) do
     :ok = Vm.signal(vm, "CONT")

@@ -46,7 +46,7 @@ defmodule Soak.Orders do
     end
   end
 
-  @doc "Gives an order on this node. With a `tag` the run gets the answer, if there is one, as `{:later, {tag, answer}}`."
+  @doc "Gives an order on this node. With a `tag` the run gets the answer, if there is one, and the robots that the node knew before, as `{:later, {tag, answer, robots}}`."
   @spec call(State.t(), atom(), {atom(), list()}, tag :: term()) :: State.t()
   def call(s, from, {function, arguments}, tag \\ nil) do
     vm = s.vms[from]
@@ -54,8 +54,9 @@ defmodule Soak.Orders do
 
     aside(
       fn ->
+        known = if tag, do: Vm.call(vm, Swarm.Transport, :robots, [], @order_ms)
         answer = Vm.call(vm, Swarm, function, arguments, @order_ms)
-        if tag, do: send(runner, {:later, {tag, answer}})
+        if tag, do: send(runner, {:later, {tag, answer, known}})
         answer
       end,
       &"#{from}: #{function} #{words(&1)}"

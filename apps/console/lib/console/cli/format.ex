@@ -92,6 +92,9 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :told, command: command} = stage),
     do: "#{stage.robot || "every robot"} is told #{told(command)}"
 
+  def meaning(%{stage: :order_refused, command: command, why: why}),
+    do: "not #{told(command)}: #{why}"
+
   def meaning(%{stage: :radio_loss, share: share}),
     do: "#{decimals(share * 100, 0)} % of the messages are lost from now on"
 

@@ -14,22 +14,10 @@ defmodule Console.Picture.MapView do
         }
 
   @doc """
-  An empty room with walls of 0.2 m.
-
-      iex> room = Console.Picture.MapView.room("hall", 16.0, 12.0)
-      iex> {room.wall?.(0.0, 0.0), room.wall?.(7.95, 0.0)}
-      {false, true}
-  """
-  @spec room(String.t(), float(), float()) :: t()
-  def room(name, width, height) do
-    wall? = fn x, y -> abs(x) > width / 2 - 0.2 or abs(y) > height / 2 - 0.2 end
-    %__MODULE__{name: name, width: width, height: height, wall?: wall?}
-  end
-
-  @doc """
   The whole map as a box.
 
-      iex> Console.Picture.MapView.box(Console.Picture.MapView.room("hall", 16.0, 12.0))
+      iex> room = %Console.Picture.MapView{name: "hall", width: 16.0, height: 12.0, wall?: fn _x, _y -> false end}
+      iex> Console.Picture.MapView.box(room)
       {-8.0, -6.0, 8.0, 6.0}
   """
   @spec box(t()) :: box()
@@ -40,7 +28,7 @@ defmodule Console.Picture.MapView do
   The box around some places with a margin, of at least the given width and height, kept within
   the map.
 
-      iex> room = Console.Picture.MapView.room("hall", 16.0, 12.0)
+      iex> room = %Console.Picture.MapView{name: "hall", width: 16.0, height: 12.0, wall?: fn _x, _y -> false end}
       iex> Console.Picture.MapView.around(room, [{7.0, 0.0}], 1.0, {4.0, 4.0})
       {4.0, -2.0, 8.0, 2.0}
   """

@@ -14,8 +14,8 @@ defmodule Console.Picture.RunTrack do
   @type t :: %__MODULE__{
           first: Scene.t(),
           last: Scene.t(),
-          ways: %{atom() => [Pose.point()]},
-          landmark: [Pose.point()],
+          ways: %{atom() => Scene.way()},
+          landmark: Scene.way(),
           errors: [{at_s :: float(), mean :: float(), max :: float()}],
           marks: [{Scene.stage(), Pose.point() | nil}]
         }
@@ -32,26 +32,15 @@ defmodule Console.Picture.RunTrack do
   @doc "The track with one more scene; lists are kept newest first."
   @spec add(t(), Scene.t()) :: t()
   def add(%__MODULE__{} = track, %Scene{} = scene) do
-    ways =
-      Enum.reduce(scene.robots, track.ways, fn robot, ways ->
-        Map.update(ways, robot.id, [Pose.point(robot.pose)], &step(&1, Pose.point(robot.pose)))
-      end)
-
     %{
       track
       | last: scene,
-        ways: ways,
-        landmark: step(track.landmark, scene.landmark),
+        ways: Scene.ways(track.ways, scene, @step_m),
+        landmark: Scene.way(track.landmark, scene.landmark, @step_m),
         errors: error(track.errors, scene),
         marks: mark(track.marks, scene)
     }
   end
-
-  defp step(way, nil), do: way
-  defp step([], place), do: [place]
-
-  defp step([newest | _] = way, place),
-    do: if(Pose.distance(newest, place) < @step_m, do: way, else: [place | way])
 
   defp error(errors, %Scene{error: nil}), do: errors
 

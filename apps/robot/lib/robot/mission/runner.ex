@@ -99,27 +99,6 @@ defmodule Robot.Mission.Runner do
   defp note_tick(runner, {:tick, %{at_ms: at_ms}}), do: %{runner | ticked_ms: at_ms}
   defp note_tick(runner, _event), do: runner
 
-  @typedoc "What is left to do for an effect."
-  @type action ::
-          {:obey, Mission.order()}
-          | {:send, to :: atom() | [atom()] | :all, struct()}
-          | {:stage, atom(), map()}
-
-  @doc """
-  What is left to do for an effect that `start/3` or `handle/2` returned: the controller obeys an order, a message is sent, a
-  stage is reported.
-
-      iex> Robot.Mission.Runner.actions({:look, 0.5})
-      [{:obey, {:look, 0.5}}]
-      iex> Robot.Mission.Runner.actions({:claim, %{standing: true}})
-      []
-  """
-  @spec actions(Mission.effect()) :: [action()]
-  def actions(order) when is_order(order), do: [{:obey, order}]
-  # It is kept here.
-  def actions({:claim, _claim}), do: []
-  def actions(action), do: [action]
-
   @doc "What the mission says of itself (`c:Robot.Mission.explain/1`); `[]` for one that says nothing."
   @spec explain(t()) :: [{label :: String.t(), text :: String.t()}]
   def explain(%__MODULE__{module: nil}), do: []

@@ -2,9 +2,9 @@ defmodule Robot.Recording.Drawing do
   @moduledoc """
   Draws what a robot knows, for Foxglove and other viewers of its schemas: where it believes itself
   to be, what others told it, what it sees, where it is going. Nothing of a scene is known to be true.
-  Its parts serve simulated runs, too. Pure.
+  Its parts, and what it says in words and plain JSON, serve simulated runs, too. Pure.
   """
-  alias Hal.Pose
+  alias Hal.{Json, Pose}
   alias Mcap.Foxglove
   alias Mcap.Foxglove.Encode
   alias Mcap.Foxglove.Scene
@@ -112,4 +112,31 @@ defmodule Robot.Recording.Drawing do
     boxes = for blob <- blobs, do: {{blob.left, blob.top, blob.right, blob.bottom}, blob.colour}
     Foxglove.image_boxes(ns, boxes, @box)
   end
+
+  @blob [:colour, :area, :x, :y, :left, :top, :right, :bottom]
+
+  @doc "The same as plain JSON."
+  @spec blobs(Vision.Detections.t()) :: binary()
+  def blobs(%{pan: pan, blobs: blobs}) do
+    blobs = for blob <- blobs, do: {:object, for(key <- @blob, do: {key, Map.fetch!(blob, key)})}
+    Json.encode!({:object, pan: pan, blobs: blobs})
+  end
+
+  @doc "Who sent a message of this kind to whom, for `Hal.Json`."
+  @spec message(from :: atom() | String.t(), to :: term(), kind :: atom()) :: Json.value()
+  def message(from, to, kind),
+    do: {:object, from: from, to: List.wrap(to), kind: kind || "?"}
+
+  @bad [:killed, :lost, :refused, :order_refused, :cannot_form, :given_up, :crashed, :disarmed]
+
+  @doc "A stage of a mission, or what happened to a fleet, as a line of a log, with its facts; `nil` is none."
+  @spec stage(non_neg_integer(), who :: atom() | String.t(), stage :: atom(), facts :: map()) ::
+          iodata()
+  def stage(ns, who, stage, facts) do
+    facts = for {key, value} <- Enum.sort(facts), value != nil, do: " #{key} #{word(value)}"
+    Foxglove.log(ns, if(stage in @bad, do: :warning, else: :info), "#{who}", "#{stage}#{facts}")
+  end
+
+  defp word(value) when is_atom(value) or is_number(value) or is_binary(value), do: "#{value}"
+  defp word(value), do: inspect(value)
 end

@@ -175,19 +175,4 @@ defmodule Robot.Recording.File do
   @doc "The robots, sorted."
   @spec ids(t()) :: [atom()]
   def ids(%__MODULE__{robots: robots}), do: robots |> Map.keys() |> Enum.sort()
-
-  @doc "Replays all entries, with what was compared and all differences found."
-  @spec replay(t()) :: {Replay.t(), [Replay.difference()]}
-  def replay(%__MODULE__{} = file) do
-    {replay, differences} =
-      file
-      |> entries()
-      |> Enum.reduce({Replay.new(), []}, fn entry, {replay, differences} ->
-        {replay, difference} = Replay.step(replay, entry)
-        {replay, List.wrap(difference) ++ differences}
-      end)
-
-    {replay, last} = Replay.finish(replay)
-    {replay, Enum.reverse(differences) ++ last}
-  end
 end

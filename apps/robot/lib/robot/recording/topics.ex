@@ -131,19 +131,17 @@ defmodule Robot.Recording.Topics do
   end
 
   defp said(robot, id, {:pilot, :effect, {:send, to, message}}, _at_ms, _ns) do
-    to = to |> List.wrap() |> Enum.map(&"#{&1}")
-    {robot, [{{id, :messages}, message("#{id}", to, message)}]}
+    {robot, [{{id, :messages}, message(id, to, message)}]}
   end
 
   defp said(robot, id, {:pilot, :input, {:cast, {:message, message}}}, _at_ms, _ns),
-    do: {robot, [{{id, :messages}, message(sender(message), ["#{id}"], message)}]}
+    do: {robot, [{{id, :messages}, message(sender(message), id, message)}]}
 
   defp said(robot, id, {:pilot, :effect, {:phase, state}}, _at_ms, ns),
     do: {%{robot | phase: phase(state)}, [log(ns, :info, id, "phase #{words(state)}")]}
 
   defp said(robot, id, {:pilot, :effect, {:stage, stage, facts}}, _at_ms, ns) do
-    facts = for {key, value} <- Enum.sort(facts), value != nil, do: " #{key} #{inspect(value)}"
-    {robot, [log(ns, :info, id, "#{stage}#{facts}")]}
+    {robot, [{"/log", Drawing.stage(ns, id, stage, facts)}]}
   end
 
   defp said(robot, id, {role, :lost, count}, _at_ms, ns),
@@ -170,9 +168,9 @@ defmodule Robot.Recording.Topics do
   defp goal_pose(_other), do: nil
 
   defp message(from, to, message),
-    do: Json.encode!({:object, [from: from, to: to, kind: "#{kind(message) || "?"}"]})
+    do: Json.encode!(Drawing.message(from, to, kind(message)))
 
-  defp sender(%{from: from}) when is_atom(from), do: "#{from}"
+  defp sender(%{from: from}) when is_atom(from), do: from
   defp sender(_other), do: "?"
 
   @doc "What kind of message a mission has sent, as far as it is known."
@@ -232,16 +230,7 @@ defmodule Robot.Recording.Topics do
   defp blobs(%{picture_ms: at_ms} = robot, _id, %{at_ms: at_ms}, _now_ms), do: {[], robot}
 
   defp blobs(robot, id, %{at_ms: taken_ms} = seen, at_ms) do
-    facts = fn -> {:object, pan: seen.pan, blobs: Enum.map(seen.blobs, &blob/1)} end
-    {said, robot} = due(robot, :blobs, at_ms, fn -> [{{id, :blobs}, Json.encode!(facts.())}] end)
+    {said, robot} = due(robot, :blobs, at_ms, fn -> [{{id, :blobs}, Drawing.blobs(seen)}] end)
     {said, if(said == [], do: robot, else: %{robot | picture_ms: taken_ms})}
-  end
-
-  defp blob(blob) do
-    {:object,
-     for(
-       key <- [:colour, :area, :x, :y, :left, :top, :right, :bottom],
-       do: {key, Map.fetch!(blob, key)}
-     )}
   end
 end

@@ -43,9 +43,6 @@ defmodule Sim.Fleet.Backend do
   @doc "The current world."
   @callback world(backend()) :: World.t()
 
-  @doc "The world's server; `nil` while there is none."
-  @callback server(backend()) :: pid() | nil
-
   @doc "The number of messages between robots so far."
   @callback messages(backend()) :: %{sent: non_neg_integer(), lost: non_neg_integer()}
 

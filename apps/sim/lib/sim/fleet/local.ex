@@ -5,7 +5,7 @@ defmodule Sim.Fleet.Local do
       supervisor (one_for_all, no restarts: a fleet cannot exist without its world)
       |-- Sim.World.Directory     unless another fleet of this node has it already
       |-- Sim.World.Server     the world
-      |-- Sim.Fleet.RadioServer  a radio that loses, if any may be lost
+      |-- Sim.Fleet.RadioServer  a radio that loses, duplicates and delays messages, if any is to
       |-- Sim.Fleet.Hardware  emulated devices of those that have the real drivers, if any has
       `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
   """
@@ -147,9 +147,6 @@ defmodule Sim.Fleet.Local do
   def world(backend), do: World.Server.world(backend.server)
 
   @impl Sim.Fleet.Backend
-  def server(backend), do: backend.server
-
-  @impl Sim.Fleet.Backend
   def messages(backend), do: RadioServer.counts(backend.air)
 
   @impl Sim.Fleet.Backend
@@ -195,7 +192,7 @@ defmodule Sim.Fleet.Local do
 
     worlds ++
       server ++
-      RadioServer.parts(options.loss, options.seed, options.script ++ options.cuts != []) ++
+      RadioServer.parts(options, options.script ++ options.cuts != []) ++
       Hardware.parts(robots, name, folder) ++ [Elixir.Robot.Fleet]
   end
 

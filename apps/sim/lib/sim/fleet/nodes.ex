@@ -135,9 +135,9 @@ defmodule Sim.Fleet.Nodes do
   @impl Sim.Fleet.Backend
   def world(backend), do: backend.world
 
-  @impl Sim.Fleet.Backend
-  def server(%{children: %{world: %{up: %{server: server}}}}), do: server
-  def server(_down), do: nil
+  # None while the world is started again.
+  defp server(%{children: %{world: %{up: %{server: server}}}}), do: server
+  defp server(_down), do: nil
 
   @impl Sim.Fleet.Backend
   def messages(backend) do
@@ -283,8 +283,7 @@ defmodule Sim.Fleet.Nodes do
        mission: setup.mission,
        plan: setup.plan,
        folder: backend.host.home,
-       loss: options.loss,
-       seed: options.seed + index
+       radio: %{options | seed: options.seed + index}
      }}
   end
 end

@@ -1,7 +1,7 @@
 defmodule Sim.Fleet.RadioServer do
   @moduledoc false
   # Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
-  # that loses and delays messages by `Sim.Radio`.
+  # that loses, duplicates and delays messages by `Sim.Radio`.
   use GenServer
   alias Robot.Names
   alias Sim.Radio
@@ -14,16 +14,17 @@ defmodule Sim.Fleet.RadioServer do
   @type counter :: :counters.counters_ref()
 
   @doc """
-  The part of a fleet's supervision tree that loses `loss` of all messages, or what a script and cuts say (`changes?`); none if none can
-  be lost.
+  The part of a fleet's supervision tree that loses, duplicates and delays messages as these options say (`Sim.Trial.Setup.new/1`), or a
+  script and cuts (`changes?`); none if the messages are to go as fast as they can.
   """
-  @spec parts(number(), integer(), changes? :: boolean()) :: [Supervisor.child_spec()]
-  def parts(loss, seed, changes? \\ false)
+  @spec parts(map(), changes? :: boolean()) :: [Supervisor.child_spec()]
+  def parts(options, changes? \\ false) do
+    radio = options |> Map.take([:seed, :loss, :duplicates, :delay_ms]) |> Map.to_list()
 
-  def parts(loss, seed, changes?) when loss > 0 or changes?,
-    do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [[seed: seed, loss: loss]]}}]
-
-  def parts(_no_loss, _seed, _changes?), do: []
+    if changes? or Radio.new(radio) != Radio.new(seed: options.seed),
+      do: [%{id: __MODULE__, start: {__MODULE__, :start_link, [radio]}}],
+      else: []
+  end
 
   @doc """
   The transport of that part, or without it the one that loses nothing, and the counter of its
@@ -47,7 +48,7 @@ defmodule Sim.Fleet.RadioServer do
     Transport.transmit(from, to, message)
   end
 
-  @doc "Starts a radio that loses and delays messages; options as in `Sim.Radio.new/1`."
+  @doc "Starts a radio that loses, duplicates and delays messages; options as in `Sim.Radio.new/1`."
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, Radio.new(options))
 

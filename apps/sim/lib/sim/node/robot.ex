@@ -4,12 +4,12 @@ defmodule Sim.Node.Robot do
 
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
       |-- Sim.World.Directory     where the world is
-      |-- Sim.Fleet.RadioServer  a radio that loses, if any is lost
+      |-- Sim.Fleet.RadioServer  a radio that loses, duplicates and delays messages, if any is to
       |-- Sim.Fleet.Hardware  emulated devices, if it has the real drivers
       `-- Robot.Fleet    the robot
 
   Options: `robot` as in `Sim.Trial.Setup`, `world`, `blobs`, `mission`, `plan`, `folder` as in
-  `Sim.Fleet.Robot`, `loss` and `seed` of the radio.
+  `Sim.Fleet.Robot`, `radio` as `Sim.Fleet.RadioServer.parts/2` takes it.
   """
   @behaviour Sim.Node
   alias Sim.Fleet.{Hardware, RadioServer, Robot}
@@ -19,7 +19,7 @@ defmodule Sim.Node.Robot do
   def start(options) do
     children =
       [World.Directory] ++
-        RadioServer.parts(options.loss, options.seed) ++
+        RadioServer.parts(options.radio) ++
         Hardware.parts([options.robot], options.world, options.folder) ++ [Elixir.Robot.Fleet]
 
     {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)

@@ -1,6 +1,5 @@
 defmodule Sim.Recording.Drawing do
   @moduledoc "Draws a run's scene for Foxglove and other viewers of its schemas. Pure."
-  alias Hal.Pose
   alias Mcap.Foxglove
   alias Mcap.Foxglove.Scene, as: Bodies
   alias Robot.Recording.Drawing
@@ -21,8 +20,8 @@ defmodule Sim.Recording.Drawing do
   @landmark {0.95, 0.85, 0.10, 1}
   @slot {0.20, 0.70, 0.30, 0.5}
 
-  @typedoc "The points of each robot's way, newest first."
-  @type paths :: %{atom() => [Pose.point()]}
+  @typedoc "Each robot's way."
+  @type paths :: %{atom() => Scene.way()}
 
   @doc "The floor plan, walls dark; a large one in larger cells."
   @spec map(Floorplan.t()) :: iodata()
@@ -108,15 +107,9 @@ defmodule Sim.Recording.Drawing do
   @doc "The ways with where the robots are now."
   @spec note(paths(), Scene.t()) :: paths()
   def note(paths, scene) do
-    for %{id: id, pose: pose} <- scene.robots, reduce: paths do
-      paths -> Map.update(paths, id, [Pose.point(pose)], &further(&1, Pose.point(pose)))
-    end
-  end
-
-  defp further([{x, y} | _] = path, {to_x, to_y}) do
-    if abs(x - to_x) + abs(y - to_y) < @apart_m,
-      do: path,
-      else: Enum.take([{to_x, to_y} | path], @points)
+    for {id, way} <- Scene.ways(paths, scene, @apart_m),
+        into: %{},
+        do: {id, Enum.take(way, @points)}
   end
 
   @doc "The robots' ways as lines."

@@ -1,26 +1,16 @@
 defmodule Sim.Recording.Facts do
   @moduledoc "Describes what a recording says of a run in words and numbers, for plots and logs. Pure."
-  import Mcap.Foxglove.Encode, only: [array: 2, number: 1, text: 1]
   alias Hal.{Json, Pose, Twist}
   alias Mcap.Foxglove
+  alias Robot.Recording.Drawing
   alias Sim.Scene
   alias Swarm.Message
 
   @doc "Something that happened, as a line of a log."
   @spec stage(non_neg_integer(), Scene.stage()) :: iodata()
-  def stage(ns, %{stage: stage} = about) do
-    facts =
-      for {key, value} <- about |> Map.drop([:stage, :at_s]) |> Enum.sort(),
-          value != nil,
-          do: " #{key} #{value}"
-
-    level =
-      if stage in [:killed, :lost, :refused, :cannot_form, :given_up, :crashed, :disarmed],
-        do: :warning,
-        else: :info
-
-    Foxglove.log(ns, level, "#{about[:robot] || "fleet"}", "#{stage}#{facts}")
-  end
+  def stage(ns, %{stage: stage} = about),
+    do:
+      Drawing.stage(ns, about[:robot] || :fleet, stage, Map.drop(about, [:stage, :at_s, :robot]))
 
   @doc "The numbers of the formation."
   @spec mission(Scene.t()) :: iodata()
@@ -90,18 +80,14 @@ defmodule Sim.Recording.Facts do
           poses?,
           do: {{id, :pose}, Foxglove.pose_in_frame(ns, "map", pose)}
 
-    [{"/messages", [~S({"messages":), array(sent, &message/1), ?}]} | poses]
-  end
-
-  defp message({from, to, kind, _pose}) do
-    to = to |> List.wrap() |> array(&word/1)
-    [~S({"from":), word(from), ~S(,"to":), to, ~S(,"kind":), word(kind), ?}]
+    messages = for {from, to, kind, _pose} <- sent, do: Drawing.message(from, to, kind)
+    [{"/messages", Json.encode!({:object, messages: messages})} | poses]
   end
 
   @doc "What the cameras saw, and how the living robots stand at the end of a tick, as `sent/2`."
   @spec robots(t(), Scene.t()) :: [{term(), iodata()}]
   def robots(facts, scene) do
-    for({id, seen} <- facts.seen, do: {{id, :blobs}, blobs(seen)}) ++
+    for({id, seen} <- facts.seen, do: {{id, :blobs}, Drawing.blobs(seen)}) ++
       for(
         robot <- scene.robots,
         robot.alive,
@@ -109,35 +95,18 @@ defmodule Sim.Recording.Facts do
       )
   end
 
-  defp blobs(seen),
-    do: [~S({"pan":), number(seen.pan), ~S(,"blobs":), array(seen.blobs, &blob/1), ?}]
-
-  defp blob(blob) do
-    [
-      [~S({"colour":), text(blob.colour), ~S(,"area":), number(blob.area)],
-      [~S(,"x":), number(blob.x), ~S(,"y":), number(blob.y)],
-      [~S(,"left":), number(blob.left), ~S(,"top":), number(blob.top)],
-      [~S(,"right":), number(blob.right), ~S(,"bottom":), number(blob.bottom), ?}]
-    ]
-  end
-
-  # Atoms of ours need no quoting.
-  defp word(atom), do: [?", Atom.to_string(atom), ?"]
-
   defp state(robot, speed) do
-    [
-      [~S({"phase":), word(robot.state), ~S(,"leads":), Atom.to_string(robot.leader?)],
-      [~S(,"error_m":), value(Scene.slot_error(robot))],
-      [~S(,"within_m":), value(robot.uncertainty), ~S(,"size_ppm":), value(robot.size_ppm)],
-      [speed(speed), ?}]
+    facts = [
+      phase: robot.state,
+      leads: robot.leader?,
+      error_m: Scene.slot_error(robot),
+      within_m: robot.uncertainty,
+      size_ppm: robot.size_ppm
     ]
-  end
 
-  defp value(nil), do: "null"
-  defp value(number), do: number(number)
+    Json.encode!({:object, facts ++ speed(speed)})
+  end
 
   defp speed(nil), do: []
-
-  defp speed(%Twist{linear: linear, turn: turn}),
-    do: [~S(,"speed_m_s":), number(linear), ~S(,"turn_rad_s":), number(turn)]
+  defp speed(%Twist{linear: linear, turn: turn}), do: [speed_m_s: linear, turn_rad_s: turn]
 end

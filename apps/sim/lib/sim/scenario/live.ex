@@ -45,7 +45,7 @@ defmodule Sim.Scenario.Live do
     end
 
     moment = Fleet.moment(fleet)
-    seen = moment |> Map.delete(:faults) |> View.of()
+    seen = View.of(moment)
     judge = Invariants.watch(run.judge, moment)
     checks = Enum.map(run.checks, &Check.tick(&1, seen, judge))
     view = shown.(moment.at_ms, RunLog.stages(moment.run_log), checks, view)

@@ -5,14 +5,15 @@ defmodule Sim.Scenario.View do
   alias Hal.Pose
   alias Robot.Mission.Runner
   alias Sim.{Radio, Scene, Trial, World}
-  alias Sim.Trial.{Evaluation, RunLog}
+  alias Sim.Trial.{Evaluation, Faults, RunLog}
   alias Swarm.Member
 
   @enforce_keys [:at_ms, :options, :world, :run_log, :claims, :phases, :parts]
   defstruct @enforce_keys
 
   @typedoc """
-  `claims` and `phases` are those of the living robots, `parts` the robots that can reach each other by radio.
+  `claims` are those of the living robots that are not frozen, `phases` those of the living ones (`:frozen` is one, too), `parts` the
+  robots that are not frozen and can reach each other by radio.
   """
   @type t :: %__MODULE__{
           at_ms: non_neg_integer(),
@@ -27,23 +28,27 @@ defmodule Sim.Scenario.View do
   @doc "A run in lockstep after a step, or a moment of a fleet."
   @spec of(Trial.t() | Sim.Fleet.moment()) :: t()
   def of(%Trial{} = trial) do
-    living = Trial.living(trial)
+    claims = Trial.claims(trial)
+    said = Faults.awake(trial.faults, claims, trial.at_ms - 1)
 
     %__MODULE__{
       at_ms: trial.at_ms,
       options: trial.options,
       world: trial.world,
       run_log: trial.run_log,
-      claims: Trial.claims(trial),
-      phases: for(id <- living, into: %{}, do: {id, phase_of(trial.members[id])}),
-      parts: Radio.parts(trial.radio, living)
+      claims: said,
+      phases: for({id, _claim} <- claims, into: %{}, do: {id, phase(trial, id, said)}),
+      parts: Radio.parts(trial.radio, Keyword.keys(said))
     }
   end
 
-  def of(moment), do: struct!(__MODULE__, moment)
+  def of(moment), do: struct!(__MODULE__, Map.delete(moment, :faults))
 
-  defp phase_of(member),
-    do: with({_module, phase} <- Runner.state(Member.runner(member)), do: phase)
+  defp phase(trial, id, said) do
+    if List.keymember?(said, id, 0),
+      do: with({_module, phase} <- Runner.state(Member.runner(trial.members[id])), do: phase),
+      else: :frozen
+  end
 
   @doc "Simulated seconds since the start."
   @spec at_s(t()) :: float()
@@ -53,17 +58,17 @@ defmodule Sim.Scenario.View do
   @spec leader(t()) :: atom() | nil
   def leader(view), do: RunLog.leader(view.run_log)
 
-  @doc "The robots that live, in the order of the fleet."
+  @doc "The robots that live and are not frozen, in the order of the fleet."
   @spec living(t()) :: [atom()]
   def living(view), do: for({id, _claim} <- view.claims, do: id)
 
-  @doc "The robots named by `who`: one, or of `:all` those that live."
+  @doc "The robots named by `who`: one, or of `:all` those that live and are not frozen."
   @spec who(t(), atom()) :: [atom()]
   def who(view, :all), do: living(view)
   def who(_view, robot), do: [robot]
 
   @doc """
-  The phase of a robot's mission; `:idle` without one, `:dead` if it was killed.
+  The phase of a robot's mission; `:idle` without one, `:frozen` without a processor, `:dead` if it was killed.
   """
   @spec phase(t(), atom()) :: atom()
   def phase(view, robot), do: Map.get(view.phases, robot, :dead)
@@ -89,7 +94,9 @@ defmodule Sim.Scenario.View do
   @doc "How far living robots are from their slots, in metres; `nil` for one without a slot."
   @spec slot_errors(t(), [atom()]) :: [{atom(), float() | nil}]
   def slot_errors(view, robots) do
-    run = %{view | claims: Map.new(view.claims)} |> Map.from_struct()
+    # The body of a frozen robot stands where it stood.
+    frozen = for {id, :frozen} <- view.phases, do: {id, %{phase: :frozen}}
+    run = %{view | claims: Map.new(frozen ++ view.claims)} |> Map.from_struct()
     scene = Evaluation.scene(Map.put(run, :messages, %{sent: 0, lost: 0}))
 
     for %{id: id, leader?: false} = robot <- scene.robots,

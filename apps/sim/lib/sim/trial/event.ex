@@ -197,7 +197,7 @@ defmodule Sim.Trial.Event do
   def robot({name, who, _more}) when name in [:tell, :freeze, :crash, :displace, :blind, :deaf],
     do: who
 
-  def robot({:hang, who, _role, _for_s}), do: who
+  def robot({name, who, _what, _more}) when name in [:hang, :order_refused], do: who
   def robot(_event), do: nil
 
   @doc """
@@ -213,6 +213,7 @@ defmodule Sim.Trial.Event do
   def stage({:remove_landmark}), do: {:landmark_removed, nil, %{}}
   def stage({:tell, :all, command}), do: {:told, nil, %{command: command}}
   def stage({:tell, id, command}), do: {:told, id, %{command: command}}
+  def stage({:order_refused, id, told, why}), do: {:order_refused, id, %{command: told, why: why}}
   def stage({:estop, id}), do: {:estop, id, %{}}
   def stage({:reset}), do: {:reset, nil, %{}}
   def stage({:cut, _what}), do: {:radio_cut, nil, %{}}

@@ -37,6 +37,17 @@ defmodule Sim.Trial.Faults do
     end)
   end
 
+  @doc """
+  Of what robots claim, that of those that are not frozen: what a frozen one claimed last is nothing that it says now.
+
+      iex> faults = Sim.Trial.Faults.add(%Sim.Trial.Faults{}, :frozen, :mag1, 0, 2_000)
+      iex> Sim.Trial.Faults.awake(faults, [mag1: %{phase: :lead}, mag2: %{phase: :follow}], 500)
+      [mag2: %{phase: :follow}]
+  """
+  @spec awake(t(), [{atom(), map()}], integer()) :: [{atom(), map()}]
+  def awake(faults, claims, at_ms),
+    do: Enum.reject(claims, fn {id, _claim} -> any?(faults, [:frozen], id, at_ms) end)
+
   @doc "The robots whose wheels stand because they are frozen."
   @spec halted(t(), integer()) :: [atom()]
   def halted(faults, at_ms) do

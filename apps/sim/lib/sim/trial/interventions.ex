@@ -60,6 +60,7 @@ defmodule Sim.Trial.Interventions do
   defp change({:tell, to, command}, trial),
     do: {trial, [{to, Event.request(command, trial.options.robots)}]}
 
+  defp change({:order_refused, _id, _command, _why}, trial), do: {trial, []}
   defp change({:estop, id}, trial), do: {trial, [{id, :estop}]}
   defp change({:reset}, trial), do: {trial, [{:all, :reset}]}
 

@@ -109,9 +109,12 @@ defmodule Sim.Trial.Mechanics do
     parts = Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0)))
     standing = for {id, member} <- trial.members, Member.stands?(member), do: id
 
-    run_log = RunLog.note(trial.run_log, trial.at_ms, claims, parts, standing)
+    said = Faults.awake(trial.faults, claims, trial.at_ms)
+
+    run_log = RunLog.held(trial.run_log, trial.at_ms, claims)
+    run_log = RunLog.note(run_log, trial.at_ms, said, parts, standing)
     worst = fn leader -> trial |> run() |> Evaluation.worst(leader) end
-    run_log = RunLog.judge(run_log, trial.at_ms, claims, worst)
+    run_log = RunLog.judge(run_log, trial.at_ms, said, worst)
     followers = fn -> Evaluation.followers(%{run(trial) | run_log: run_log}) end
     %{trial | run_log: RunLog.watch(run_log, trial.at_ms, followers)}
   end

@@ -94,7 +94,7 @@ defmodule Sim.Trial.RunLog do
   defp newest(%{most: most}, all), do: Enum.take(all, most)
 
   @doc """
-  One tick of claims, the parts that the radio is divided into (`nil` if it is whole), and which
+  One tick of what robots claim that are not frozen, the parts that the radio is divided into (`nil` if it is whole), and which
   robots stand still.
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]] | nil, [atom()]) :: t()
@@ -110,7 +110,7 @@ defmodule Sim.Trial.RunLog do
     elected? = run_log.elections > 0
 
     %{
-      held(run_log, at_ms, claims)
+      run_log
       | leader: highest(leaders),
         epoch:
           Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
@@ -127,7 +127,9 @@ defmodule Sim.Trial.RunLog do
     }
   end
 
-  defp held(run_log, at_ms, claims) do
+  @doc "The same tick: which robots an emergency stop holds, frozen ones among them."
+  @spec held(t(), integer(), [{atom(), map()}]) :: t()
+  def held(run_log, at_ms, claims) do
     held = for {id, %{estop: callers}} <- claims, do: {id, callers}
     estop = Scene.estop(run_log.estop, held, length(claims), at_ms)
     log = %{run_log | estop: estop}

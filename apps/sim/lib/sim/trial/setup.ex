@@ -27,12 +27,12 @@ defmodule Sim.Trial.Setup do
   @doc """
   A setup. Options (a keyword list or a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
   `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
-  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Sim.Trial.Event`, in lockstep only), `loss` (0 to 1), `noise` (`:off`,
+  (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Sim.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Sim.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.Missions`: `:patrol`,
-  `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only); of the radio in
-  lockstep also `casts` (`:sent` or `:drawn`: in which order the parts of a robot's program hear each other), `cuts` (`Sim.Trial.Cuts`), `duplicates` (0 to 1) and `delay_ms` (`{5, 50}`). Errors are one line.
+  `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do

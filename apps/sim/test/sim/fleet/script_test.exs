@@ -65,7 +65,7 @@ defmodule Sim.Fleet.ScriptTest do
     stage(fleet, :reset)
     for id <- [:mag64, :mag65], do: eventually(fn -> not Swarm.status(id).estop end)
     assert %{robot: :mag65} = stage(fleet, :displaced)
-    world = fleet |> Fleet.server() |> World.Server.world()
+    %{world: world} = Fleet.moment(fleet)
     assert Pose.distance(World.truth(world, :mag65), {3.0, 3.0}) < 0.01
     assert %{robot: :mag64} = stage(fleet, :not_displaced)
     Fleet.stop(fleet)

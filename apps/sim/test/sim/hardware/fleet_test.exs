@@ -27,13 +27,13 @@ defmodule Sim.Hardware.FleetTest do
 
     for id <- [:mag61, :min61] do
       eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(id)) end)
-      start = World.truth(World.Server.world(Fleet.server(fleet)), id)
+      start = World.truth(Fleet.moment(fleet).world, id)
       place = Pose.place(start, {0.7, 0.2})
       assert order(fn -> Swarm.goto(id, place) end) == :ok
       eventually(fn -> Swarm.status(id).state == :done end)
 
       eventually(fn ->
-        Pose.distance(World.truth(World.Server.world(Fleet.server(fleet)), id), place) < 0.15
+        Pose.distance(World.truth(Fleet.moment(fleet).world, id), place) < 0.15
       end)
 
       {:ok, board} = Board.find(id)

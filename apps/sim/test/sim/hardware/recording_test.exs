@@ -39,7 +39,7 @@ defmodule Sim.Hardware.RecordingTest do
 
     {:ok, file} = Recording.File.open(path)
     assert file.whole?
-    {replay, differences} = Recording.File.replay(file)
+    {replay, differences} = Robot.Case.replay(file)
     assert differences == []
     counts = Replay.counts(replay)
     assert length(counts) == 8

@@ -1,5 +1,6 @@
 defmodule Sim.Recording.FileTest do
   use Sim.LockstepCase, async: true
+  import Swarm.Case, only: [eventually: 1]
   alias Sim.{Recorder, Recording, Replay, Trial}
   @moduletag :tmp_dir
 
@@ -12,7 +13,10 @@ defmodule Sim.Recording.FileTest do
   @mounts status == 0
 
   defp write(path, ticks) do
-    {:ok, setup} = Trial.setup(%{robots: [:mag1, :mag2], seed: 5, blobs: :direct})
+    # What has words of its own for people is a term here.
+    script = [{0.5, {:tell, :mag1, {:formation, :wedge, 1.0}}}]
+    options = %{robots: [:mag1, :mag2], seed: 5, blobs: :direct, script: script}
+    {:ok, setup} = Trial.setup(options)
     {:ok, recorder} = Recorder.start_link(path, setup)
 
     trial =
@@ -31,6 +35,9 @@ defmodule Sim.Recording.FileTest do
     assert {:ok, _setup, _trial} = write(other, 60)
     assert File.read!(one) == File.read!(other)
 
+    {:ok, reader} = Mcap.Reader.open(one)
+    log = for {"/log", _, _, bytes} <- Mcap.Reader.messages(reader, topics: ["/log"]), do: bytes
+    assert Enum.any?(log, &(&1 =~ "told command {:formation, :wedge, 1.0}"))
     assert {:ok, file} = Recording.File.open(one)
     assert {file.whole?, file.setup, Recording.File.last_ms(file)} == {true, setup, 6_000}
 
@@ -61,6 +68,31 @@ defmodule Sim.Recording.FileTest do
     # Every byte belongs to a whole record.
     assert Recording.File.last_ms(file) == List.last(ticks)
     assert String.ends_with?(File.read!(path), Mcap.magic())
+  end
+
+  # A pipe that nothing empties is such a disk.
+  test "a disk that hangs is told after a second, with the file, and the recording is whole", %{
+    tmp_dir: folder
+  } do
+    [pipe, path] = for name <- ~w(pipe.mcap run.mcap), do: Path.join(folder, name)
+    {_said, 0} = System.cmd("mkfifo", [pipe])
+    # The first opening makes the file, the second writes it.
+    script = ~S(exec 3<"$1"; read go; cat <&3 >"$2")
+    sh = [:binary, :exit_status, args: ["-c", script, "sh", pipe, path]]
+    reader = Port.open({:spawn_executable, "/bin/sh"}, sh)
+
+    ExUnit.CaptureIO.capture_io(:stderr, fn ->
+      writer = Task.async(fn -> write(pipe, 60) end)
+      said = fn -> :standard_error |> Process.whereis() |> StringIO.contents() |> elem(1) end
+      eventually(fn -> said.() =~ "#{pipe}: its disk does not answer; the run waits for it" end)
+      assert Task.yield(writer, 0) == nil
+      Port.command(reader, "go\n")
+      assert {:ok, _setup, _trial} = Task.await(writer, 30_000)
+    end)
+
+    assert_receive {^reader, {:exit_status, 0}}, 10_000
+    assert {:ok, %{whole?: true} = file} = Recording.File.open(path)
+    assert Recording.File.last_ms(file) == 6_000
   end
 
   test "a file that was cut is read as far as it is whole", %{tmp_dir: folder} do

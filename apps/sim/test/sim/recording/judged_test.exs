@@ -138,7 +138,7 @@ defmodule Sim.Recording.JudgedTest do
     end
 
     {:ok, file} = Robot.Recording.File.open(context.live)
-    assert {_replay, []} = Robot.Recording.File.replay(file)
+    assert {_replay, []} = Robot.Case.replay(file)
   end
 
   @tag Judges.tag(:python)

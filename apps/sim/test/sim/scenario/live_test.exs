@@ -40,6 +40,32 @@ defmodule Sim.Scenario.LiveTest do
     assert List.last(verdicts).figures == "only a run in lockstep is judged by this"
   end
 
+  test "a frozen robot claims nothing, and an order that is refused is told as that" do
+    {:ok, scenario} =
+      Scenario.new(
+        options: [robots: [:mag70, :mag71], blobs: :direct, duration_s: 5],
+        script: [{0.2, {:freeze, :mag70, 3}}, {0.4, {:tell, :mag70, "wander"}}],
+        expect: [
+          {:never_phase, :mag70, :search, from_s: 0.5, to_s: 2.5},
+          {:phase, :mag70, :search, after_s: 3.3, by_s: 5}
+        ]
+      )
+
+    assert {:ok, %{stages: stages}, _at_s, verdicts} = Scenario.Live.run(scenario)
+    assert Enum.all?(verdicts, & &1.held?), inspect(verdicts)
+
+    assert [%{robot: :mag70, command: "wander", why: "mag70 does not answer"}] =
+             Enum.filter(stages, &(&1.stage == :order_refused))
+  end
+
+  test "a scenario with an order that only lockstep draws is refused" do
+    {:ok, scenario} = Scenario.new(options: [robots: 1, casts: :drawn])
+
+    assert Scenario.Live.run(scenario) ==
+             {:error,
+              "casts: :drawn is for runs in lockstep; processes hear each other as they are"}
+  end
+
   test "what cannot start is one line" do
     {:ok, scenario} = Scenario.new(options: [robots: 1, map: "nowhere.png"])
     assert {:error, line} = Scenario.Live.run(scenario)

@@ -90,6 +90,54 @@ defmodule Sim.Scenario.RunnerTest do
            ]) == [true, true, true]
   end
 
+  test "what a frozen robot claimed last does not count" do
+    script = [{1, {:freeze, :mag1, 3}}]
+
+    expect = [
+      {:phase, :mag1, :search, by_s: 0.5},
+      {:never_phase, :mag1, :search, from_s: 1.2, to_s: 3.8},
+      {:phase, :mag1, :search, after_s: 4.1, by_s: 5},
+      {:never_phase, :all, :search, from_s: 1.2, to_s: 3.8}
+    ]
+
+    assert held(@alone, script, expect) == [true, true, true, true]
+  end
+
+  test "a frozen leader does not lead, and its fleet is not in formation by what it said" do
+    options = [robots: 2, seed: 3, duration_s: 60]
+    {_result, [formed]} = run(options, [], [{:formed, by_s: 60}])
+    assert formed.held?
+    at_s = formed.at_s + 1
+    script = [{at_s, {:freeze, :leader, 1}}]
+
+    assert held(options, script, [
+             {:leader, by_s: at_s - 0.5},
+             {:not_formed, from_s: at_s + 0.2, to_s: at_s + 0.9},
+             {:same_leader, from_s: at_s - 0.5, to_s: at_s + 0.9}
+           ]) == [true, true, false]
+  end
+
+  test "an order that is refused is told as that, by whom and why" do
+    script = [
+      {1, {:estop, :mag1}},
+      {2, {:freeze, :mag2, 2}},
+      {3, {:tell, :all, "wander"}},
+      {3.5, {:tell, :mag2, {:formation, :line, 1.0}}}
+    ]
+
+    {%{stages: stages}, _verdicts} = run([robots: [:mag1, :mag2], duration_s: 4], script, [])
+
+    assert [
+             {3.0, :mag1, "wander", "mag1 is held by the emergency stop; reset it first"},
+             {3.0, :mag2, "wander", "mag2 does not answer"},
+             {3.5, :mag2, {:formation, :line, 1.0}, "mag2 does not answer"}
+           ] ==
+             for(
+               %{stage: :order_refused} = s <- stages,
+               do: {s.at_s, s.robot, s.command, s.why}
+             )
+  end
+
   test "the emergency stop of one robot stops all, a reset moves nobody" do
     options = [robots: 3, duration_s: 12]
     script = [{3, {:estop, :mag2}}, {6, :reset}]
@@ -122,7 +170,9 @@ defmodule Sim.Scenario.RunnerTest do
     assert parts.(cut ++ [{2, {:join}}], 3) == [robots]
     assert parts.([{1, {:deaf, :min1, 1}}], 1.5) == [[:mag1, :mag2], [:min1]]
     assert parts.([{1, {:deaf, :min1, 1}}], 2.5) == [robots]
-    assert parts.([{1, {:freeze, :mag2, 1}}], 1.5) == [[:mag1, :min1], [:mag2]]
+    # One that is frozen is not asked who leads it.
+    assert parts.([{1, {:freeze, :mag2, 1}}], 1.5) == [[:mag1, :min1]]
+    assert parts.([{1, {:freeze, :mag2, 1}}], 2.5) == [robots]
 
     lossy = stepped([robots: robots], [{0, {:loss, 1}}], 3)
     assert lossy.radio.lost == lossy.radio.sent

@@ -104,6 +104,26 @@ defmodule Swarm.Commands.Client do
   defp late({:command, id}, answer, answers), do: Map.put(answers, id, answer)
   defp late({:stamp, _id, _to}, _stamp, answers), do: answers
 
+  @doc """
+  Of robots with such answers, those that do not accept, each with a line that says why.
+
+      iex> Swarm.Commands.Client.refusals([:mag1, :mag2, :mag3], %{mag1: :ok, mag2: {:error, "mag2: its gate hangs"}})
+      [mag2: "mag2: its gate hangs", mag3: "mag3 does not answer"]
+  """
+  @spec refusals([atom()], %{atom() => term()}) :: [{robot :: atom(), line :: String.t()}]
+  def refusals(robots, answers) do
+    accepted? = &(&1 == :ok or match?({:ok, _line}, &1))
+    for id <- robots, not accepted?.(answers[id]), do: {id, refusal(id, answers[id])}
+  end
+
+  defp refusal(id, nil), do: "#{id} does not answer"
+  defp refusal(_id, {:error, line}) when is_binary(line), do: line
+
+  defp refusal(id, {:error, :no_formation}),
+    do: "#{id} is not on a mission that has a formation; start it first"
+
+  defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
+
   # The nearest process that takes the request. If its node is not connected, or not heard, the
   # way through other nodes comes first, `{:relay, process or nil}`; `nil` if nobody knows the
   # robot.
