@@ -28,6 +28,7 @@ defmodule Sim.Invariants.Leaders do
   mission is ended by a stop, and a minority where a majority is needed.
   """
   alias Sim.Invariants.Violation
+  alias Sim.Trial.RunLog
 
   @known_ms 2_000
   @two_ms 1_800
@@ -83,6 +84,7 @@ defmodule Sim.Invariants.Leaders do
   """
   @spec note(t(), integer(), [{atom(), map()}], [[atom()]]) :: {[Violation.t()], t()}
   def note(judge, at_ms, claims, parts) do
+    led = RunLog.leaders(claims, parts)
     claims = Map.new(claims)
 
     judge = %{
@@ -92,9 +94,9 @@ defmodule Sim.Invariants.Leaders do
     }
 
     {wrong, parts} =
-      Enum.reduce(parts, {majorities(judge, at_ms), %{}}, fn part, {wrong, parts} ->
+      Enum.reduce(led, {majorities(judge, at_ms), %{}}, fn {part, leaders}, {wrong, parts} ->
         clocks = Map.get(judge.parts, part, %{since: at_ms})
-        {more, clocks} = judge(judge, part, clocks, claims, at_ms)
+        {more, clocks} = judge(judge, part, leaders, clocks, claims, at_ms)
         {wrong ++ more, Map.put(parts, part, clocks)}
       end)
 
@@ -123,9 +125,8 @@ defmodule Sim.Invariants.Leaders do
 
   defp majorities(_judge, _at_ms), do: []
 
-  defp judge(judge, part, clocks, claims, at_ms) do
+  defp judge(judge, part, leaders, clocks, claims, at_ms) do
     active = for id <- part, takes_part?(claims[id]), do: id
-    leaders = for id <- active, is_map_key(judge.leading, id), do: id
 
     clocks =
       clocks

@@ -72,11 +72,10 @@ defmodule Sim.Scenario.View do
   @spec role(t(), atom()) :: Robot.Mission.role() | nil
   def role(view, robot), do: view.run_log.roles[phase(view, robot)]
 
-  @doc "Each part of the radio's network, with those who lead in it."
+  @doc "Each part of the radio's network, with those who lead in it (`Sim.Trial.RunLog.leaders/2`)."
   @spec leaders(t()) :: [{part :: [atom()], leaders :: [atom()]}]
-  def leaders(view) do
-    for part <- view.parts, do: {part, Enum.filter(part, &(role(view, &1) == :leads))}
-  end
+  def leaders(view),
+    do: RunLog.leaders(for(id <- living(view), do: {id, %{role: role(view, id)}}), view.parts)
 
   @doc "The true pose of a robot."
   @spec pose(t(), atom()) :: Pose.t()
