@@ -9,7 +9,7 @@ defmodule Sim.Fleet do
   use GenServer
   alias Hal.{Pose, Ticker}
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
-  alias Sim.{Radio, Scene, World}
+  alias Sim.{Moment, Radio, Scene, World}
   alias Sim.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
   alias Swarm.Commands.Client
   alias Swarm.EStop.Broadcaster
@@ -76,23 +76,8 @@ defmodule Sim.Fleet do
   @spec result(GenServer.server()) :: map()
   def result(fleet), do: GenServer.call(fleet, :result, :infinity)
 
-  @typedoc """
-  A fleet at one moment: the true world, what the living robots claim, the phases of their missions, and the parts of the radio in which robots
-  reach each other.
-  """
-  @type moment :: %{
-          at_ms: non_neg_integer(),
-          options: map(),
-          world: World.t(),
-          run_log: RunLog.t(),
-          claims: [{atom(), map()}],
-          phases: %{atom() => atom()},
-          parts: [[atom()]],
-          faults: Faults.t()
-        }
-
   @doc "The fleet as it was at its last look, a tenth of a second ago at most, for what judges a run."
-  @spec moment(GenServer.server()) :: moment()
+  @spec moment(GenServer.server()) :: Moment.t()
   def moment(fleet), do: GenServer.call(fleet, :moment, :infinity)
 
   @doc "Kills a robot, or the leader: all its processes at once, as if its power failed."
@@ -169,10 +154,8 @@ defmodule Sim.Fleet do
   def handle_call(:scene, _from, s), do: {:reply, s |> run() |> Evaluation.scene(), s}
 
   def handle_call(:moment, _from, s) do
-    claims = ask(s, :claims)
-    ids = for {id, _claim} <- claims, do: id
-    more = %{claims: claims, phases: phases(claims), parts: parts(s) || [ids], faults: s.faults}
-    {:reply, s |> run() |> Map.delete(:messages) |> Map.merge(more), s}
+    moment = s |> run() |> Map.put(:faults, s.faults)
+    {:reply, Moment.of_processes(moment, ask(s, :claims), parts(s)), s}
   end
 
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
@@ -308,9 +291,6 @@ defmodule Sim.Fleet do
     {:ok, _pid} = Task.start(fn -> Client.ask(robots, request) end)
     s
   end
-
-  # What a robot claims says in which phase it is, but for one without a mission.
-  defp phases(claims), do: for({id, claim} <- claims, into: %{}, do: {id, claim[:phase] || :idle})
 
   # Puts into effect who is cut off from now on.
   defp cut(%{setup: %{options: options}} = s, now) do

@@ -5,7 +5,8 @@ defmodule Sim.Scenario do
   """
   alias Hal.Options
   alias Hal.Options.{Suggest, Type}
-  alias Sim.Scenario.{Expectation, Names}
+  alias Sim.Check.Expectation
+  alias Sim.Scenario.Names
   alias Sim.Trial
   alias Sim.Trial.Event
 
@@ -14,7 +15,7 @@ defmodule Sim.Scenario do
   @typedoc """
   `options` are those of `Sim.Trial.Options` that were given, without `script`, in the order of that
   table; `robots` are names. `script` has events `{at_s, event}` (`Sim.Trial.Event`), `expect` has
-  expectations (`Sim.Scenario.Expectation`); both in the order in which they were given.
+  expectations (`Sim.Check.Expectation`); both in the order in which they were given.
   """
   @type t :: %__MODULE__{
           about: String.t(),

@@ -1,0 +1,160 @@
+defmodule Sim.Moment do
+  @moduledoc """
+  Shows a run at one moment as checks look at it: the true state of the world, and what robots claim. The same of a run in
+  lockstep and of a fleet of processes (`Sim.Fleet.moment/1`). Pure.
+  """
+  alias Hal.Pose
+  alias Robot.Mission.Runner
+  alias Sim.{Radio, Scene, Trial, World}
+  alias Sim.Trial.{Evaluation, Faults, RunLog}
+  alias Swarm.{EStop, Member}
+
+  @known [:at_ms, :options, :world, :run_log, :faults]
+  @enforce_keys @known
+  defstruct @known ++
+              [claims: [], doing: %{}, parts: [], places: nil, stops: nil, crash: nil]
+
+  @typedoc """
+  `claims` and `doing` (the mission and its phase) are those of the living robots, `parts` the robots that can reach each
+  other by radio. `places` (`c:Robot.Mission.place/2`) and `stops` are those of robots that are not frozen; `nil` where they are
+  inside processes. `crash` is when and why the step after this moment raised.
+  """
+  @type t :: %__MODULE__{
+          at_ms: non_neg_integer(),
+          options: map(),
+          world: World.t(),
+          run_log: RunLog.t(),
+          faults: Faults.t(),
+          claims: [{atom(), map()}],
+          doing: %{atom() => Runner.state() | nil},
+          parts: [[atom()]],
+          places: [{atom(), {:slot, term()} | {:fault, String.t()}}] | nil,
+          stops: %{atom() => EStop.State.t()} | nil,
+          crash: {at_ms :: non_neg_integer(), reason :: term()} | nil
+        }
+
+  @doc "A run before its first step, when nobody has claimed anything."
+  @spec start(%{:at_ms => integer(), optional(atom()) => term()}) :: t()
+  def start(run), do: struct!(__MODULE__, Map.take(run, @known))
+
+  @doc "A run in lockstep after a step."
+  @spec of(Trial.t()) :: t()
+  def of(%Trial{members: members, at_ms: at_ms} = trial) do
+    moment = start(trial)
+    claims = Trial.claims(trial)
+    awake = for {id, _claim} <- claims, not frozen?(moment, id), do: id
+    runners = for {id, _claim} <- claims, into: %{}, do: {id, Member.runner(members[id])}
+
+    places =
+      for id <- awake,
+          %{module: module, mission: mission} when module != nil <- [runners[id]],
+          place = Robot.Mission.place(module, mission, at_ms),
+          do: {id, place}
+
+    %{
+      moment
+      | claims: claims,
+        doing: Map.new(runners, fn {id, runner} -> {id, Runner.state(runner)} end),
+        parts: Radio.parts(trial.radio, Enum.map(claims, &elem(&1, 0))),
+        places: places,
+        stops: for(id <- awake, into: %{}, do: {id, Member.role(members[id], :estop).stop})
+    }
+  end
+
+  @doc "A fleet of processes, with the parts of its radio (`nil`: it is whole). What a robot claims says what it does."
+  @spec of_processes(map(), [{atom(), map()}], [[atom()]] | nil) :: t()
+  def of_processes(run, claims, parts) do
+    mission = run.run_log.mission
+    phases = Robot.Mission.phases(mission)
+
+    doing =
+      for {id, claim} <- claims, into: %{} do
+        phase = claim[:phase] || :idle
+        {id, {if(phase in phases, do: mission), phase}}
+      end
+
+    parts = parts || [for({id, _claim} <- claims, do: id)]
+    %{start(run) | claims: claims, doing: doing, parts: parts}
+  end
+
+  # What a frozen robot claimed last is nothing that it says or does now.
+  defp frozen?(moment, id), do: Faults.any?(moment.faults, [:frozen], id, moment.at_ms - 1)
+
+  @doc """
+  What the robots that are not frozen claim of the run's mission, each with its `role` (`t:Robot.Mission.role/0`); what a
+  robot with another mission claims is nothing that this one says.
+  """
+  @spec said(t()) :: [{atom(), map()}]
+  def said(%{run_log: log} = moment) do
+    for {id, claim} <- moment.claims, not frozen?(moment, id) do
+      ours? = match?({mission, _phase} when mission == log.mission, moment.doing[id])
+      {id, if(ours?, do: Map.put(claim, :role, RunLog.role(log, claim)), else: %{})}
+    end
+  end
+
+  @doc "Simulated seconds since the start."
+  @spec at_s(t()) :: float()
+  def at_s(moment), do: moment.at_ms / 1000
+
+  @doc "The leader now, or `nil`."
+  @spec leader(t()) :: atom() | nil
+  def leader(moment), do: RunLog.leader(moment.run_log)
+
+  @doc "The robots named by `who`: one, or of `:all` those that live, in the order of the fleet."
+  @spec who(t(), atom()) :: [atom()]
+  def who(moment, :all), do: for({id, _claim} <- moment.claims, do: id)
+  def who(_moment, robot), do: [robot]
+
+  @doc "The phase of a robot's mission; `:idle` without one, `:dead` if it was killed."
+  @spec phase(t(), atom()) :: atom()
+  def phase(moment, robot) do
+    case moment.doing do
+      %{^robot => {_mission, phase}} -> phase
+      %{^robot => :idle} -> :idle
+      _killed -> :dead
+    end
+  end
+
+  @doc "What the robot does for its group in the phase it is in (`Robot.Mission.roles/1`); `nil` for nothing."
+  @spec role(t(), atom()) :: Robot.Mission.role() | nil
+  def role(moment, robot), do: moment.run_log.roles[phase(moment, robot)]
+
+  @doc "Each part of the radio's network, with those who lead in it (`Sim.Trial.RunLog.leaders/2`)."
+  @spec leaders(t()) :: [{part :: [atom()], leaders :: [atom()]}]
+  def leaders(moment) do
+    claims = for id <- who(moment, :all), do: {id, %{role: role(moment, id)}}
+    RunLog.leaders(claims, moment.parts)
+  end
+
+  @doc "The true pose of a robot."
+  @spec pose(t(), atom()) :: Pose.t()
+  def pose(moment, robot), do: World.truth(moment.world, robot)
+
+  @doc "The true speed of a robot's body: m/s and rad/s."
+  @spec speed(t(), atom()) :: {float(), float()}
+  def speed(moment, robot), do: Map.fetch!(moment.world.robots, robot).speed
+
+  @doc "How far living robots are from their slots, in metres; `nil` for one without a slot."
+  @spec slot_errors(t(), [atom()]) :: [{atom(), float() | nil}]
+  def slot_errors(moment, robots) do
+    run = Map.take(moment, [:at_ms, :options, :world, :run_log])
+    messages = %{sent: 0, lost: 0}
+
+    scene =
+      Evaluation.scene(Map.merge(run, %{claims: Map.new(moment.claims), messages: messages}))
+
+    for %{id: id, leader?: false} = robot <- scene.robots,
+        id in robots,
+        do: {id, if(robot.alive, do: Scene.slot_error(robot))}
+  end
+
+  @doc "The distance to the landmark that a robot measures, and the true one, in metres; or `nil`."
+  @spec distance(t(), atom()) :: {measured :: float(), true_m :: float()} | nil
+  def distance(%{world: %{landmark: landmark}} = moment, robot) do
+    with {_id, claim} <- List.keyfind(moment.claims, robot, 0),
+         %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <-
+           RunLog.account(moment.run_log, claim),
+         do: {millimetres / 1000, Pose.distance(pose(moment, robot), landmark)},
+         else: (_does_not_see -> nil)
+  end
+end
