@@ -14,7 +14,7 @@ defmodule Sim.Check do
   alias Sim.Check.{Expectation, Violation}
   alias Sim.Moment
 
-  @enforce_keys [:expectation, :kind, :window]
+  @enforce_keys [:expectation, :kind, :asked, :window]
   defstruct @enforce_keys ++ [memory: :new, status: :open]
 
   @type status ::
@@ -25,6 +25,7 @@ defmodule Sim.Check do
   @type t :: %__MODULE__{
           expectation: Expectation.t(),
           kind: module(),
+          asked: Expectation.t(),
           window: {number(), number() | :end},
           memory: :new | :unseen | term(),
           status: status()
@@ -33,9 +34,12 @@ defmodule Sim.Check do
   @doc "The check of an expectation, before the first moment."
   @spec new(Expectation.t()) :: t()
   def new(expectation) do
+    {kind, asked} = Expectation.asked(expectation)
+
     %__MODULE__{
       expectation: expectation,
-      kind: Expectation.kind(expectation),
+      kind: kind,
+      asked: asked,
       window: Expectation.window(expectation),
       status: if(match?({:never, _invariant}, expectation), do: :holding, else: :open)
     }
@@ -64,7 +68,7 @@ defmodule Sim.Check do
   defp judged(%{memory: :new} = check, moment, at_s),
     do: judged(%{check | memory: check.kind.new(moment.options)}, moment, at_s)
 
-  defp judged(%{expectation: asked, window: {_from_s, to_s}} = check, moment, at_s) do
+  defp judged(%{asked: asked, window: {_from_s, to_s}} = check, moment, at_s) do
     over? = to_s != :end and at_s >= to_s
 
     case check.kind.note(asked, moment, check.memory) do

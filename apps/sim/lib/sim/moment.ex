@@ -3,10 +3,9 @@ defmodule Sim.Moment do
   Shows a run at one moment as checks look at it: the true state of the world, and what robots claim. The same of a run in
   lockstep and of a fleet of processes (`Sim.Fleet.moment/1`). Pure.
   """
-  alias Hal.Pose
   alias Robot.Mission.Runner
-  alias Sim.{Radio, Scene, Trial, World}
-  alias Sim.Trial.{Evaluation, Faults, RunLog}
+  alias Sim.{Radio, Trial, World}
+  alias Sim.Trial.{Faults, RunLog}
   alias Swarm.{EStop, Member}
 
   @known [:at_ms, :options, :world, :run_log, :faults]
@@ -96,10 +95,6 @@ defmodule Sim.Moment do
   @spec at_s(t()) :: float()
   def at_s(moment), do: moment.at_ms / 1000
 
-  @doc "The leader now, or `nil`."
-  @spec leader(t()) :: atom() | nil
-  def leader(moment), do: RunLog.leader(moment.run_log)
-
   @doc "The robots named by `who`: one, or of `:all` those that live, in the order of the fleet."
   @spec who(t(), atom()) :: [atom()]
   def who(moment, :all), do: for({id, _claim} <- moment.claims, do: id)
@@ -124,37 +119,5 @@ defmodule Sim.Moment do
   def leaders(moment) do
     claims = for id <- who(moment, :all), do: {id, %{role: role(moment, id)}}
     RunLog.leaders(claims, moment.parts)
-  end
-
-  @doc "The true pose of a robot."
-  @spec pose(t(), atom()) :: Pose.t()
-  def pose(moment, robot), do: World.truth(moment.world, robot)
-
-  @doc "The true speed of a robot's body: m/s and rad/s."
-  @spec speed(t(), atom()) :: {float(), float()}
-  def speed(moment, robot), do: Map.fetch!(moment.world.robots, robot).speed
-
-  @doc "How far living robots are from their slots, in metres; `nil` for one without a slot."
-  @spec slot_errors(t(), [atom()]) :: [{atom(), float() | nil}]
-  def slot_errors(moment, robots) do
-    run = Map.take(moment, [:at_ms, :options, :world, :run_log])
-    messages = %{sent: 0, lost: 0}
-
-    scene =
-      Evaluation.scene(Map.merge(run, %{claims: Map.new(moment.claims), messages: messages}))
-
-    for %{id: id, leader?: false} = robot <- scene.robots,
-        id in robots,
-        do: {id, if(robot.alive, do: Scene.slot_error(robot))}
-  end
-
-  @doc "The distance to the landmark that a robot measures, and the true one, in metres; or `nil`."
-  @spec distance(t(), atom()) :: {measured :: float(), true_m :: float()} | nil
-  def distance(%{world: %{landmark: landmark}} = moment, robot) do
-    with {_id, claim} <- List.keyfind(moment.claims, robot, 0),
-         %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <-
-           RunLog.account(moment.run_log, claim),
-         do: {millimetres / 1000, Pose.distance(pose(moment, robot), landmark)},
-         else: (_does_not_see -> nil)
   end
 end

@@ -4,7 +4,8 @@ defmodule Sim.Check.Bodies do
   # `Sim.Check.Kind`.
   @behaviour Sim.Check.Kind
   alias Hal.Pose
-  alias Sim.Moment
+  alias Sim.{Moment, Scene, World}
+  alias Sim.Trial.{Evaluation, RunLog}
 
   # Slower is not driving: a robot that keeps its place creeps.
   @moving_m_s 0.05
@@ -14,14 +15,14 @@ defmodule Sim.Check.Bodies do
 
   @impl Sim.Check.Kind
   def note({:at, robot, place, by}, moment, nearest) do
-    away = Pose.distance(Moment.pose(moment, robot), place)
+    away = Pose.distance(World.truth(moment.world, robot), place)
     # An atom is greater than any number.
     nearest = min(nearest, away)
     {:reach, away <= by[:within_m], "#{m(nearest)} away at the nearest", nearest}
   end
 
   def note({:in_slot, who, by}, moment, _) do
-    errors = Moment.slot_errors(moment, Moment.who(moment, who))
+    errors = slot_errors(moment, Moment.who(moment, who))
     so? = errors != [] and Enum.all?(errors, fn {_id, e} -> e != nil and e <= by[:within_m] end)
     {:reach, so?, off(errors), nil}
   end
@@ -30,14 +31,17 @@ defmodule Sim.Check.Bodies do
     robots = if who == :all, do: moment.options.robots, else: [who]
 
     moving =
-      for id <- robots, {v, w} = Moment.speed(moment, id), v != 0.0 or w != 0.0, do: {id, v, w}
+      for id <- robots,
+          {v, w} = moment.world.robots[id].speed,
+          v != 0.0 or w != 0.0,
+          do: {id, v, w}
 
     {:keep, moving == [], if(moving == [], do: "all still", else: speeds(moving)), nil}
   end
 
   def note({:moves, who, _by}, moment, moved) do
     robots = Moment.who(moment, who)
-    now = for id <- robots, {v, _w} = Moment.speed(moment, id), abs(v) > @moving_m_s, do: id
+    now = for id <- robots, {v, _w} = moment.world.robots[id].speed, abs(v) > @moving_m_s, do: id
     moved = Enum.uniq((moved || []) ++ now)
     left = robots -- moved
     figures = if left == [], do: "each did", else: "not #{Enum.join(left, ", ")}"
@@ -47,7 +51,7 @@ defmodule Sim.Check.Bodies do
   # Turning is counted from the beginning of the window, and judged at its end: who turns on would
   # pass the right angle.
   def note({:turned, robot, degrees, by}, moment, memory) do
-    heading = Moment.pose(moment, robot).heading
+    heading = World.truth(moment.world, robot).heading
     {last, sum} = memory || {heading, 0.0}
     sum = sum + Pose.relative(Pose.new(0, 0, last), Pose.new(0, 0, heading)).heading
     turned = sum * 180 / :math.pi()
@@ -57,7 +61,7 @@ defmodule Sim.Check.Bodies do
   end
 
   def note({:sees_distance, robot, options}, moment, seen) do
-    case Moment.distance(moment, robot) do
+    case distance(moment, robot) do
       nil ->
         over? = options[:to_s] != nil and Moment.at_s(moment) >= options[:to_s]
         {:keep, seen != nil or not over?, seen || "it does not see the landmark", seen}
@@ -69,8 +73,17 @@ defmodule Sim.Check.Bodies do
     end
   end
 
-  def note({:speed_at_most, most}, moment, fastest), do: speed(most, moment, fastest)
-  def note({:speed_at_most, most, _window}, moment, fastest), do: speed(most, moment, fastest)
+  def note({:speed_at_most, most, _window}, moment, fastest) do
+    speeds =
+      for id <- moment.options.robots,
+          {v, w} = moment.world.robots[id].speed,
+          do: {abs(v), id, v, w}
+
+    fastest = Enum.max([fastest || {0.0, hd(moment.options.robots), 0.0, 0.0} | speeds])
+    {top, id, v, w} = fastest
+    # Rounding of the last bits is not speed.
+    {:keep, top <= most + 1.0e-9, "at most " <> speeds([{id, v, w}]), fastest}
+  end
 
   def note({:separation_at_least, least}, moment, _) do
     near = moment.world.min_separation
@@ -79,14 +92,26 @@ defmodule Sim.Check.Bodies do
      "#{if near, do: m(near), else: "nobody"} at the nearest", nil}
   end
 
-  defp speed(most, moment, fastest) do
-    speeds =
-      for id <- moment.options.robots, {v, w} = Moment.speed(moment, id), do: {abs(v), id, v, w}
+  # Of living robots; `nil` for one without a slot.
+  defp slot_errors(moment, robots) do
+    run = Map.take(moment, [:at_ms, :options, :world, :run_log])
+    messages = %{sent: 0, lost: 0}
 
-    fastest = Enum.max([fastest || {0.0, hd(moment.options.robots), 0.0, 0.0} | speeds])
-    {top, id, v, w} = fastest
-    # Rounding of the last bits is not speed.
-    {:keep, top <= most + 1.0e-9, "at most " <> speeds([{id, v, w}]), fastest}
+    scene =
+      Evaluation.scene(Map.merge(run, %{claims: Map.new(moment.claims), messages: messages}))
+
+    for %{id: id, leader?: false} = robot <- scene.robots,
+        id in robots,
+        do: {id, if(robot.alive, do: Scene.slot_error(robot))}
+  end
+
+  # The distance to the landmark that a robot measures, and the true one, in metres; or `nil`.
+  defp distance(%{world: %{landmark: landmark}} = moment, robot) do
+    with {_id, claim} <- List.keyfind(moment.claims, robot, 0),
+         %{sight: %{distance: millimetres}} when millimetres != nil and landmark != nil <-
+           RunLog.account(moment.run_log, claim),
+         do: {millimetres / 1000, Pose.distance(World.truth(moment.world, robot), landmark)},
+         else: (_does_not_see -> nil)
   end
 
   defp off([]), do: "nobody has a slot"

@@ -68,8 +68,8 @@ defmodule Sim.Check.Expectation do
   """
   @spec read(term()) :: Type.result()
   def read(term) do
-    with {:ok, expectation} <- Form.read(term, forms(), "an expectation"),
-         do: ordered(expectation)
+    forms = for {_kind, form} <- table(), do: form
+    with {:ok, expectation} <- Form.read(term, forms, "an expectation"), do: ordered(expectation)
   end
 
   # A window that ends before it begins would hold always, or never.
@@ -80,8 +80,6 @@ defmodule Sim.Check.Expectation do
       do: {:ok, expectation},
       else: {:error, [{[], "expected an end after the beginning, got #{inspect(expectation)}"}]}
   end
-
-  defp forms, do: for({_kind, form} <- table(), do: form)
 
   # All expectations, as forms of `Sim.Trial.Form`, with the module that judges them (`Sim.Check.Kind`).
   defp table do
@@ -133,16 +131,18 @@ defmodule Sim.Check.Expectation do
   defp seconds, do: {:number, 0, 1_000_000, "s"}
   defp required(type), do: [type, required: true]
 
-  @doc "The module that judges an expectation (`Sim.Check.Kind`)."
-  @spec kind(t()) :: module()
-  def kind({:never, invariant}), do: Invariants.kind(invariant)
+  @doc "The module that judges an expectation (`Sim.Check.Kind`), and what it is asked: with options, also if none are given."
+  @spec asked(t()) :: {module(), t()}
+  def asked({:never, invariant} = never), do: {Invariants.kind(invariant), never}
 
-  def kind(expectation) do
-    {kind, _form} =
-      Enum.find(table(), fn {_kind, form} -> elem(form, 0) == elem(expectation, 0) end)
-
-    kind
+  def asked(expectation) do
+    {kind, {_name, values, keys}} = row(expectation)
+    whole? = keys == [] or tuple_size(expectation) > length(values) + 1
+    {kind, if(whole?, do: expectation, else: Tuple.append(expectation, []))}
   end
+
+  defp row(expectation),
+    do: Enum.find(table(), fn {_kind, form} -> elem(form, 0) == elem(expectation, 0) end)
 
   @doc "The phases that a robot may be in, with any mission that has a name (`c:Robot.Mission.phases/0`)."
   @spec phases() :: [atom()]
@@ -167,7 +167,7 @@ defmodule Sim.Check.Expectation do
   @doc "The robots that it names."
   @spec robots(t()) :: [atom()]
   def robots(expectation) do
-    {_name, types, _keys} = List.keyfind(forms(), elem(expectation, 0), 0)
+    {_kind, {_name, types, _keys}} = row(expectation)
     for {{:robot, _type}, n} <- Enum.with_index(types, 1), do: elem(expectation, n)
   end
 

@@ -13,8 +13,10 @@ defmodule Sim.Check.Fleet do
   def note({:formed, _by}, moment, _),
     do: reach(RunLog.formed?(moment.run_log), fn so? -> formation(so?, moment) end)
 
-  def note({:not_formed}, moment, _), do: unformed(moment)
-  def note({:not_formed, _window}, moment, _), do: unformed(moment)
+  def note({:not_formed, _window}, moment, _) do
+    now? = RunLog.formed?(moment.run_log)
+    {:keep, not now?, formation(now?, moment), nil}
+  end
 
   # Whether the formation was left in this window. One that was never left is enough at its end.
   def note({:formed_again, within}, moment, left?) do
@@ -25,21 +27,21 @@ defmodule Sim.Check.Fleet do
   end
 
   def note({:leader, _by}, moment, _),
-    do: reach(Moment.leader(moment) != nil, fn _ -> leader(moment) end)
+    do: reach(RunLog.leader(moment.run_log) != nil, fn _ -> leader(moment) end)
 
   def note({:leader_changed, _within}, moment, first) do
-    first = first || {:at_first, Moment.leader(moment)}
+    first = first || {:at_first, RunLog.leader(moment.run_log)}
     {:at_first, before} = first
-    now = Moment.leader(moment)
+    now = RunLog.leader(moment.run_log)
 
     {:reach, now not in [nil, before], "#{leader(moment)}, at first #{before || "nobody"} did",
      first}
   end
 
   def note({:same_leader, _window}, moment, first) do
-    first = first || {:at_first, Moment.leader(moment)}
+    first = first || {:at_first, RunLog.leader(moment.run_log)}
     {:at_first, before} = first
-    so? = before != nil and Moment.leader(moment) == before
+    so? = before != nil and RunLog.leader(moment.run_log) == before
     {:keep, so?, "#{leader(moment)}, at first #{before || "nobody"} did", first}
   end
 
@@ -65,11 +67,14 @@ defmodule Sim.Check.Fleet do
   def note({:phase, who, phase, _by}, moment, _),
     do: all(moment, who, &(Moment.phase(moment, &1) == phase))
 
-  def note({:never_phase, who, phase}, moment, _), do: never(who, phase, moment)
-  def note({:never_phase, who, phase, _window}, moment, _), do: never(who, phase, moment)
+  def note({:never_phase, who, phase, _window}, moment, _) do
+    there = Enum.filter(Moment.who(moment, who), &(Moment.phase(moment, &1) == phase))
+    keep(there == [], fn -> phases(moment, there) end, "never #{phase}")
+  end
 
   def note({:says, who, word, _by}, moment, _) do
-    robots = Moment.who(moment, who) -- if who == :all, do: [Moment.leader(moment)], else: []
+    robots =
+      Moment.who(moment, who) -- if who == :all, do: [RunLog.leader(moment.run_log)], else: []
 
     said =
       for {id, claim} <- moment.claims,
@@ -84,17 +89,12 @@ defmodule Sim.Check.Fleet do
   defp keep(true, _wrong, figures), do: {:keep, true, figures, nil}
   defp keep(false, wrong, _figures), do: {:keep, false, wrong.(), nil}
 
-  defp unformed(moment) do
-    now? = RunLog.formed?(moment.run_log)
-    {:keep, not now?, formation(now?, moment), nil}
-  end
-
   defp formation(true, moment), do: "in formation, #{leader(moment)}"
 
   defp formation(false, moment),
     do: "not in formation: #{leader(moment)}; #{phases(moment, Moment.who(moment, :all))}"
 
-  defp leader(moment), do: "#{Moment.leader(moment) || "nobody"} leads"
+  defp leader(moment), do: "#{RunLog.leader(moment.run_log) || "nobody"} leads"
 
   defp leads({part, []}), do: "nobody leads #{Enum.join(part, ", ")}"
   defp leads({part, leaders}), do: "#{Enum.join(leaders, " and ")} lead #{Enum.join(part, ", ")}"
@@ -106,11 +106,6 @@ defmodule Sim.Check.Fleet do
     robots = Moment.who(moment, who)
     so? = robots != [] and Enum.all?(robots, so?)
     reach(so?, fn _ -> phases(moment, robots) end)
-  end
-
-  defp never(who, phase, moment) do
-    there = Enum.filter(Moment.who(moment, who), &(Moment.phase(moment, &1) == phase))
-    keep(there == [], fn -> phases(moment, there) end, "never #{phase}")
   end
 
   defp phases(moment, robots),
