@@ -48,6 +48,14 @@ defmodule Docs.Case do
         |> Enum.map(&Path.relative_to(&1, @root))
     ]
 
+  @doc "What was measured, on its day: its commands are looked at, and not typed again."
+  def reports do
+    @root
+    |> Path.join("docs/reports/*.md")
+    |> Path.wildcard()
+    |> Enum.map(&Path.relative_to(&1, @root))
+  end
+
   @doc "All in the document is known; commands that nobody types have the words and options of their programs."
   def look(document) do
     items = Reader.items(File.read!(Path.join(@root, document)))
@@ -86,7 +94,7 @@ defmodule System.DocsTest do
   use Docs.Case, async: true, documents: []
 
   @root Path.expand("..", __DIR__)
-  @documents Docs.Case.documents()
+  @documents Docs.Case.documents() ++ Docs.Case.reports()
 
   for document <- @documents do
     @document document

@@ -46,12 +46,9 @@ defmodule Golden do
     Sim.Trial.Memory.prepare()
     {:ok, options} = text |> String.split() |> Options.parse()
     {:ok, trial} = options |> Options.trial() |> Sim.Trial.new()
-    report = trial |> play() |> Sim.Trial.result() |> Report.json(0.0)
+    report = trial |> Sim.Run.play() |> Sim.Trial.result() |> Report.json(0.0)
     {line, "#{digest(report)}  #{text}"}
   end
-
-  defp play(trial),
-    do: if(Sim.Trial.done?(trial), do: trial, else: trial |> Sim.Trial.step() |> play())
 
   defp digest(report),
     do: :sha256 |> :crypto.hash(report) |> Base.encode16(case: :lower) |> binary_part(0, 16)

@@ -7,7 +7,7 @@ defmodule Bench.Explore do
   """
   alias Hal.Pose
   alias Robot.Navigation.Grid
-  alias Sim.Trial
+  alias Sim.{Run, Trial}
   alias Sim.Trial.Coverage
   alias Swarm.Member
 
@@ -51,24 +51,23 @@ defmodule Bench.Explore do
     with {:ok, setup} <- Trial.setup(options) do
       plan = Sim.Floorplan.grid(setup.map)
       area = Coverage.area(setup.map, Enum.map(setup.robots, &Pose.point(&1.start)))
-      run = %{area: area, seen_s: nil, share: 0.0}
-      {trial, run} = setup |> Trial.begin() |> go(run)
-      {:ok, measure(trial, run, plan, options)}
+      seen = %{area: area, seen_s: nil, share: 0.0}
+      run = setup |> Trial.begin() |> Run.new()
+      {%{source: trial}, seen} = Run.fold(run, seen, fn run, _ -> Run.done?(run) end, &note/3)
+      {:ok, measure(trial, look(trial, seen), plan, options)}
     end
   end
 
-  defp go(trial, run) do
-    run = if rem(trial.at_ms, 1_000) == 0, do: look(trial, run), else: run
-    if Trial.done?(trial), do: {trial, look(trial, run)}, else: go(Trial.step(trial), run)
+  defp note(_before, %{source: trial} = run, seen),
+    do: {run, if(rem(trial.at_ms, 1_000) == 0, do: look(trial, seen), else: seen)}
+
+  defp look(trial, seen) do
+    share = Coverage.share(seen.area, Coverage.fullest(trial))
+    seen_s = seen.seen_s || if(share >= @share, do: trial.at_ms / 1_000)
+    %{seen | share: share, seen_s: seen_s}
   end
 
-  defp look(trial, run) do
-    share = Coverage.share(run.area, Coverage.fullest(trial))
-    seen_s = run.seen_s || if(share >= @share, do: trial.at_ms / 1_000)
-    %{run | share: share, seen_s: seen_s}
-  end
-
-  defp measure(trial, run, plan, options) do
+  defp measure(trial, seen, plan, options) do
     map = Coverage.fullest(trial)
     ready? = Trial.formed?(trial)
 
@@ -82,10 +81,10 @@ defmodule Bench.Explore do
       map: options.map,
       robots: length(options.robots),
       seed: options.seed,
-      area_m2: Coverage.size_m2(run.area),
-      seen_s: run.seen_s,
+      area_m2: Coverage.size_m2(seen.area),
+      seen_s: seen.seen_s,
       ready_s: if(ready?, do: trial.at_ms / 1_000),
-      share: run.share,
+      share: seen.share,
       walls: walls(map, plan),
       off_m: Enum.max(off),
       collisions: Trial.result(trial).collisions

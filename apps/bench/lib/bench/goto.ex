@@ -5,7 +5,7 @@ defmodule Bench.Goto do
   """
   alias Hal.Pose
   alias Robot.Navigation.{Grid, Reach}
-  alias Sim.Trial
+  alias Sim.{Run, Trial}
   alias Sim.Trial.Setup
   alias Swarm.Member
 
@@ -122,7 +122,9 @@ defmodule Bench.Goto do
     way_s = way_m / Setup.profile(kind).max_linear
     limit_ms = round(1000 * (@more_s + @times * way_s))
     trial = setup |> Trial.begin() |> Trial.command(kind, {:goto, x, y, nil})
-    {trial, ended} = go(trial, kind, limit_ms)
+
+    over? = &(&1.at_ms >= limit_ms or ended(&1, kind) != :silent)
+    trial = Run.play(trial, over?)
     [robot] = Trial.scene(trial).robots
 
     %{
@@ -130,7 +132,7 @@ defmodule Bench.Goto do
       seed: seed,
       from: hd(setup.robots).start,
       goal: goal,
-      ended: ended,
+      ended: ended(trial, kind),
       off_m: Pose.distance(robot.pose, goal),
       took_s: trial.at_ms / 1000,
       way_m: way_m,
@@ -139,15 +141,11 @@ defmodule Bench.Goto do
     }
   end
 
-  defp go(%{at_ms: at_ms} = trial, _kind, limit_ms) when at_ms >= limit_ms, do: {trial, :silent}
-
-  defp go(trial, kind, limit_ms) do
-    trial = Trial.step(trial)
-
+  defp ended(trial, kind) do
     case Member.runner(Trial.robot(trial, kind)) do
-      %{phase: :done} -> {trial, :done}
-      %{phase: :given_up, claim: %{blocked_by: why}} -> {trial, {:given_up, why}}
-      _under_way -> go(trial, kind, limit_ms)
+      %{phase: :done} -> :done
+      %{phase: :given_up, claim: %{blocked_by: why}} -> {:given_up, why}
+      _under_way -> :silent
     end
   end
 

@@ -4,7 +4,7 @@ defmodule Bench.Recording do
   processor time of the whole VM and in wall time. Both look at the scene of each tick, as the demo does.
   """
   alias Bench.Table
-  alias Sim.{Recorder, Trial}
+  alias Sim.{Recorder, Run, Trial}
 
   @typedoc "A run: processor time and wall time in ms, ticks, and the recording's bytes."
   @type run :: %{
@@ -57,33 +57,29 @@ defmodule Bench.Recording do
     %{cpu_ms: then_ms - cpu_ms, wall_ms: wall_ms, ticks: ticks, bytes: bytes}
   end
 
-  defp play(setup, nil), do: steps(Trial.begin(setup), nil, 0)
+  defp play(setup, nil), do: steps(Trial.begin(setup), &looked/2)
 
   # A new file each time: to write over one costs more.
   defp play(setup, path) do
     _none_at_first = File.rm(path)
     {:ok, recorder} = Recorder.start_link(path, setup)
-    ticks = steps(Trial.begin(setup, record: true), recorder, 0)
+    ticks = steps(Trial.begin(setup, record: true), &Recorder.step(recorder, &1, &2))
     :ok = Recorder.close(recorder)
     ticks
   end
 
-  defp steps(trial, recorder, ticks) do
-    if Trial.done?(trial) do
-      ticks
-    else
-      trial = Trial.step(trial)
-      scene = Trial.scene(trial)
-      trial |> record(recorder, scene) |> steps(recorder, ticks + 1)
-    end
+  defp looked(_before, trial) do
+    _scene = Trial.scene(trial)
+    trial
   end
 
-  defp record(trial, nil, _scene), do: trial
+  defp steps(trial, record) do
+    each = fn before, run, ticks ->
+      {%{run | source: record.(before.source, run.source)}, ticks + 1}
+    end
 
-  defp record(trial, recorder, scene) do
-    {entries, trial} = Trial.take_entries(trial)
-    :ok = Recorder.tick(recorder, {scene.at_ms, entries}, scene)
-    trial
+    {_run, ticks} = trial |> Run.new() |> Run.fold(0, fn run, _ -> Run.done?(run) end, each)
+    ticks
   end
 
   @doc """

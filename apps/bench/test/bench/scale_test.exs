@@ -6,7 +6,7 @@ defmodule Bench.ScaleTest do
   # What a robot costs in a step, in reductions, on the release of OTP that they were counted with: they are the same on
   # each machine. Whoever changes them by more than a tenth says why, here and in the commit. Last: the roles of a robot are the
   # same in lockstep as live, so that what an executive tells of its doing is reckoned there, too, and all effects are handed
-  # on (7,130, 11,230 and 17,380 before; processor time is as before, docs/results.md section 2); and what they tell each other
+  # on (7,130, 11,230 and 17,380 before; processor time is as before, docs/reports/processes.md); and what they tell each other
   # is checked as it arrives, and handed on in the order sent (7,680, 11,870 and 18,060 before); and each message goes through
   # the role of comms, as live (8,170, 12,430 and 18,590 before).
   @otp "25"

@@ -7,11 +7,9 @@ defmodule Console.Demo do
   alias Console.Picture.RunTrack
   alias Hal.Pose
   alias Robot.Navigation.MapFile
-  alias Sim.{Recorder, Scene, Trial}
+  alias Sim.{Recorder, Run, Scene, Trial}
   alias Sim.Recording.{Facts, Pictures}
   alias Sim.Trial.Coverage
-
-  @progress_ms 100
 
   # A fleet of more robots may be too large for real time.
   @large 20
@@ -42,29 +40,28 @@ defmodule Console.Demo do
         Enum.each([heading | lines.(trial)], &Output.line(output, &1))
         started = Hal.Clock.now_ms()
 
-        run =
-          play(
-            %{
-              module: trial_module,
-              trial: trial,
-              track: track(options, scene),
-              recorder: recorder,
-              pictures: options.record_pictures,
-              tables: tables,
-              told: 0,
-              starts: for(robot <- scene.robots, do: Pose.point(robot.pose)),
-              drawn_ms: started,
-              pace: {0, started, trial_module == Trial and length(scene.robots) > @large},
-              output: output,
-              duration_s: Options.duration_s(options)
-            },
-            scene
-          )
+        view = %{
+          track: track(options, scene),
+          recorder: recorder,
+          pictures: options.record_pictures,
+          tables: tables,
+          told: 0,
+          starts: for(robot <- scene.robots, do: Pose.point(robot.pose)),
+          drawn_ms: started,
+          pace: {0, started, trial_module == Trial and length(scene.robots) > @large},
+          output: output,
+          duration_s: Options.duration_s(options)
+        }
+
+        view = view |> tell(scene) |> draw(scene)
+
+        {run, view} =
+          trial |> Run.new() |> Run.fold(view, fn run, _ -> Run.done?(run) end, &show/3)
 
         Output.finish(output)
-        status = finish(run, options, (Hal.Clock.now_ms() - started) / 1000)
-        line = ended.(run.trial) || recorded(run, options, output)
-        stop.(run.trial)
+        status = finish(run, view, options, (Hal.Clock.now_ms() - started) / 1000)
+        line = ended.(run.source) || recorded(view, options, output)
+        stop.(run.source)
         if line, do: refuse(line), else: status
 
       {:error, line} ->
@@ -114,10 +111,10 @@ defmodule Console.Demo do
     do: with({:error, line} <- open.(path), do: {:error, "#{option} #{line}"})
 
   # Why what was wanted of the run is not whole, or `nil`.
-  defp recorded(run, options, output) do
+  defp recorded(view, options, output) do
     kept = [
-      {"--record", options.record, run.recorder && fn -> Recorder.close(run.recorder) end},
-      {"--csv", options.csv, run.tables && fn -> Tables.close(run.tables) end}
+      {"--record", options.record, view.recorder && fn -> Recorder.close(view.recorder) end},
+      {"--csv", options.csv, view.tables && fn -> Tables.close(view.tables) end}
     ]
 
     Enum.find_value(kept, fn
@@ -170,24 +167,13 @@ defmodule Console.Demo do
   defp track(%Options{picture: nil}, _scene), do: nil
   defp track(_options, scene), do: RunTrack.new(scene)
 
-  defp play(run, scene) do
-    run = run |> tell(scene) |> draw(scene)
-
-    if run.module.done?(run.trial) do
-      run
-    else
-      before = run.trial
-      trial = step(run.module, before)
-      scene = run.module.scene(trial)
-      {trial, run} = run |> paced(scene) |> record(before, trial, scene)
-      play(%{run | trial: trial, track: run.track && RunTrack.add(run.track, scene)}, scene)
-    end
-  end
-
-  defp paced(run, scene) do
-    {pace, line} = pace(run.pace, scene.at_ms, Hal.Clock.now_ms())
-    if line, do: Output.line(run.output, line)
-    %{run | pace: pace}
+  defp show(before, run, view) do
+    scene = Run.scene(run)
+    {pace, line} = pace(view.pace, scene.at_ms, Hal.Clock.now_ms())
+    if line, do: Output.line(view.output, line)
+    {trial, view} = record(view, before.source, run.source, scene)
+    view = %{view | pace: pace, track: view.track && RunTrack.add(view.track, scene)}
+    {%{run | source: trial}, view |> tell(scene) |> draw(scene)}
   end
 
   @doc """
@@ -216,37 +202,27 @@ defmodule Console.Demo do
 
   def pace(pace, _at_ms, _now_ms), do: {pace, nil}
 
-  # Robots in real time go by themselves.
-  defp step(Sim.Fleet, fleet) do
-    receive do
-    after
-      @progress_ms -> fleet
-    end
-  end
+  defp record(%{recorder: nil, tables: nil} = view, _before, trial, _scene), do: {trial, view}
 
-  defp step(module, trial), do: module.step(trial)
-
-  defp record(%{recorder: nil, tables: nil} = run, _before, trial, _scene), do: {trial, run}
-
-  defp record(run, before, trial, scene) do
+  defp record(view, before, trial, scene) do
     {entries, trial} = Trial.take_entries(trial)
 
-    if run.recorder do
-      frames = Pictures.due(before, run.pictures)
-      :ok = Recorder.tick(run.recorder, {scene.at_ms, entries}, scene, frames)
+    if view.recorder do
+      frames = Pictures.due(before, view.pictures)
+      :ok = Recorder.tick(view.recorder, {scene.at_ms, entries}, scene, frames)
     end
 
-    {trial, %{run | tables: run.tables && Tables.tick(run.tables, Facts.of(entries), scene)}}
+    {trial, %{view | tables: view.tables && Tables.tick(view.tables, Facts.of(entries), scene)}}
   end
 
-  defp tell(run, scene) do
-    new = Scene.news(scene.stages, run.told)
-    Enum.each(new, &Output.line(run.output, Format.stage(&1)))
-    %{run | told: Scene.told(scene.stages)}
+  defp tell(view, scene) do
+    new = Scene.news(scene.stages, view.told)
+    Enum.each(new, &Output.line(view.output, Format.stage(&1)))
+    %{view | told: Scene.told(scene.stages)}
   end
 
-  defp draw(run, scene),
-    do: Output.redraw(run, fn -> {scene.at_ms / 1000, run.duration_s, note(scene)} end)
+  defp draw(view, scene),
+    do: Output.redraw(view, fn -> {scene.at_ms / 1000, view.duration_s, note(scene)} end)
 
   defp note(%{leader: nil}), do: "no leader yet"
   defp note(%{error: nil} = scene), do: "#{scene.leader} leads"
@@ -254,17 +230,17 @@ defmodule Console.Demo do
   defp note(%{error: {mean, _max}} = scene),
     do: "#{scene.leader} leads, formation error #{Format.decimals(mean, 2)} m"
 
-  defp finish(run, options, wall_s) do
-    result = run.trial |> run.module.result() |> Map.put(:seen, seen(run))
-    formed? = run.module.scene(run.trial).formed?
-    Enum.each(Report.summary(result, formed?, wall_s), &Output.line(run.output, &1))
+  defp finish(%{source: trial} = run, view, options, wall_s) do
+    result = run |> Run.result() |> Map.put(:seen, seen(trial, view.starts))
+    formed? = Run.scene(run).formed?
+    Enum.each(Report.summary(result, formed?, wall_s), &Output.line(view.output, &1))
 
     title = Picture.title(length(options.robots), options.map, options.seed)
-    drawing = run.track && fn -> Picture.draw(run.track, title) end
+    drawing = view.track && fn -> Picture.draw(view.track, title) end
 
     written =
-      with :ok <- Report.write(options, Report.json(result, wall_s), drawing, run.output),
-           do: save_map(run, options)
+      with :ok <- Report.write(options, Report.json(result, wall_s), drawing, view.output),
+           do: save_map(trial, options, view.output)
 
     case written do
       :ok ->
@@ -275,16 +251,16 @@ defmodule Console.Demo do
     end
   end
 
-  defp seen(%{module: Trial} = run), do: Coverage.of(run.trial, run.starts)
-  defp seen(_real_time), do: nil
+  defp seen(%Trial{} = trial, starts), do: Coverage.of(trial, starts)
+  defp seen(_real_time, _starts), do: nil
 
   # That of the robot that knows most: what another one has told last may not have reached all.
-  defp save_map(_run, %Options{save_map: nil}), do: :ok
+  defp save_map(_trial, %Options{save_map: nil}, _output), do: :ok
 
-  defp save_map(run, %Options{save_map: file}) do
-    with map when map != nil <- Coverage.fullest(run.trial),
+  defp save_map(trial, %Options{save_map: file}, output) do
+    with map when map != nil <- Coverage.fullest(trial),
          :ok <- named("--save-map", file, &MapFile.save(&1, map)) do
-      Output.line(run.output, "Wrote #{file}")
+      Output.line(output, "Wrote #{file}")
     else
       nil -> {:error, "--save-map #{file} cannot be written: no robot is left that has a map"}
       error -> error

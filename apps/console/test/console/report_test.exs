@@ -116,7 +116,7 @@ defmodule Console.ReportTest do
     line = fn robot -> hd(Console.Cli.Format.one(%{scene | robots: [robot | rest]}, robot.id)) end
 
     assert line.(%{first | leader?: false, state: :unsure, uncertainty: 0.618}) =~
-             ~r/^mag1: in its slot, but not sure of its place, at .* degrees, ±0\.62 m by its own estimate/
+             ~r/^mag1: not sure of its place, at .* degrees, ±0\.62 m by its own estimate/
 
     refute line.(%{first | uncertainty: nil}) =~ "±"
   end

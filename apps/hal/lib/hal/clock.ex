@@ -1,5 +1,5 @@
 defmodule Hal.Clock do
-  @moduledoc "Reads the clock of those who are given none: the monotonic one of this VM."
+  @moduledoc "Default clock: this VM's monotonic time."
 
   @doc "The time in milliseconds (`System.monotonic_time/1`)."
   @spec now_ms() :: integer()

@@ -1,26 +1,26 @@
 defmodule Hal.CommandOutput do
   @moduledoc """
-  Guards the standard output of a command that people start, which may be lost: a disk is full, or nobody reads any
+  Guards the standard output of a command that people start, which may be lost: a disk is full, or no program reads any
   more.
 
-  Erlang writes later, and tells nobody what became of it; only the next one that writes learns it. A command
+  Erlang writes later, and reports no failure; only the next one that writes learns it. A command
   that prints once and ends would say that all went well.
   """
   alias Hal.Options.Suggest
 
-  # The status that a shell reports for a program whose output nobody reads any more, such as that of `head`.
+  # The status that a shell reports for a program whose output is read no more, such as that of `head`.
   @unread 141
 
   @doc """
   Runs a command, and returns what it returns. If its standard output was lost, the process exits with
   `{:shutdown, status}`, which Mix makes the exit status: 1 and a line of this `name` if it could not be written, 141
-  and nothing said if nobody reads it. An exit `{:shutdown, status}` of the command passes otherwise.
+  and nothing said if it is not read. An exit `{:shutdown, status}` of the command passes otherwise.
   """
   @spec run(name :: String.t(), (... -> result)) :: result when result: term()
   def run(name, command) do
     ended = outcome(command)
     flush()
-    # If the output was lost, whoever writes has been told by now, and this is refused.
+    # If the output was lost, the writer has been told by now, and this is refused.
     IO.write("")
 
     case ended do

@@ -1,6 +1,6 @@
 defmodule Hal.Drive do
   @moduledoc """
-  Defines what a drive base can do, whoever built it. With most bases one wire carries not only the
+  Defines what a drive base of any maker can do. With most bases one wire carries not only the
   wheels, but also the ranges, the bumpers and the battery, so a drive reports all of them as
   readings.
 

@@ -34,7 +34,7 @@ defmodule Hal.Event do
   | `[:robot, :executive, :away]` | `at_ms` | `robot`: it was started again away from its start pose, and does not know where it is |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |
-  | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands although nobody stopped it, such as a bumper that stays pressed; `nil` when that is over |
+  | `[:robot, :fault]` | `at_ms` | `robot`, `line`: why it stands without having been stopped, such as a bumper that stays pressed; `nil` when that is over |
   | `[:robot, :executive, :silent]` | `at_ms` | `robot`, `behaviour` (a module, or `nil`), `line` (where, in words): it misses its ticks |
   | `[:robot, :executive, :hung]` | `at_ms` | the same: it has missed them for 2 s, and is restarted |
   | `[:robot, :executive, :again]` | `at_ms` | the same: it ticks again without a restart |
@@ -52,7 +52,7 @@ defmodule Hal.Event do
   | `[:mesh, :unknown_node]` | `at_ms` | `name`, `address`: a node has the secret, but is not in the roster |
   | `[:mesh, :duplicate_node]` | `at_ms` | `node`, `address`: another node uses this node's name, from that address; told once for each address, and every five minutes |
   | `[:mesh, :unique_node]` | `at_ms` | `node`: the other one has not been heard for 10 s |
-  | `[:mesh, :no_network]` | `at_ms` | `line`: nobody was heard for 3 s, and this is why (`Mesh.fault/0`); once for each reason |
+  | `[:mesh, :no_network]` | `at_ms` | `line`: no node was heard for 3 s, and this is why (`Mesh.fault/0`); once for each reason |
   | `[:mesh, :network]` | `at_ms` | that is over |
   | `[:mesh, :libcluster]` | `at_ms` | `reason`: libcluster ended, and is restarted |
   | `[:swarm, :responder, :failure]` | | `robot`, `service`, `kind`, `reason`: the code of a service failed |

@@ -1,13 +1,13 @@
 defmodule Mcap.FileWriter do
   @moduledoc """
-  Writes an MCAP file: a process, so that no disk holds up who records.
+  Writes an MCAP file: a process, so that no disk holds up the recording program.
 
       {:ok, recorder} = Mcap.FileWriter.start_link(path: "run.mcap")
       {:ok, id} = Mcap.FileWriter.channel(recorder, "/log", "json", Mcap.Foxglove.schema("foxglove.Log"))
       :ok = Mcap.FileWriter.message(recorder, id, ns, payload)
       :ok = Mcap.FileWriter.close(recorder)
 
-  `message/4` does not wait: whoever sends more than a disk takes calls `sync/1` now and then. A chunk is written when
+  `message/4` does not wait: a program that sends more than a disk takes calls `sync/1` now and then. A chunk is written when
   it is full, after a second of log time, and after a second: when the VM is killed, what is older is in the file.
 
   Nothing that goes wrong ends the caller: the first error is the answer of `sync/1`, `flush/1` and `close/1` from then
@@ -41,7 +41,7 @@ defmodule Mcap.FileWriter do
     on, which is made if it is missing
   - `limit_bytes` (from 4 MiB): the most that these files have together; the oldest are deleted. A message may have a
     quarter of it
-  - `library` (`"convoy"`): who writes; `chunk_bytes` (1 MiB)
+  - `library` (`"convoy"`): the program that writes; `chunk_bytes` (1 MiB)
   - `name`: of the process, as `GenServer` takes it
 
   Raises `ArgumentError` with one line for other options. That a file cannot be made is the answer of `sync/1`.
@@ -132,7 +132,7 @@ defmodule Mcap.FileWriter do
 
   @impl GenServer
   def init(options) do
-    # To end the file when whoever started this ends.
+    # To end the file when the process that started this ends.
     Process.flag(:trap_exit, true)
     # A disk that hangs must not hold up the caller.
     {:ok, %__MODULE__{path: options[:path]}, {:continue, options}}

@@ -46,7 +46,7 @@ defmodule Mcap.Reader do
           cut_at: non_neg_integer() | nil
         }
 
-  @typedoc "`data` is part of a whole chunk, which stays in memory with it: who keeps it, copies it (`:binary.copy/1`)."
+  @typedoc "`data` is part of a whole chunk, which stays in memory with it: to keep it, copy it (`:binary.copy/1`)."
   @type message ::
           {topic :: String.t(), Channel.t(), log_time_ns :: non_neg_integer(), data :: binary()}
 

@@ -1,6 +1,6 @@
 defmodule Mcap.Writer do
   @moduledoc """
-  Turns messages into the bytes of an MCAP file. Pure: whoever calls it writes what it returns, in that order.
+  Turns messages into the bytes of an MCAP file. Pure: the caller writes what it returns, in that order.
 
       {t, head} = Mcap.Writer.new(library: "convoy 0.1.0")
       {id, t} = Mcap.Writer.channel(t, "/mag1/pose", "json", Mcap.Foxglove.schema("foxglove.PoseInFrame"), %{})
@@ -29,7 +29,7 @@ defmodule Mcap.Writer do
   @doc """
   A new file, and how it begins.
 
-  Options: `library` (who writes it, `"convoy"`), `chunk_bytes` (1 MiB), `chunk_ns` (`nil`), `summary_offsets`
+  Options: `library` (the program that writes it, `"convoy"`), `chunk_bytes` (1 MiB), `chunk_ns` (`nil`), `summary_offsets`
   (`true`; where the groups of the summary begin). Raises `ArgumentError` with one line for others.
   """
   @spec new(keyword()) :: {t(), iodata()}

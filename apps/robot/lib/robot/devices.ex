@@ -22,7 +22,7 @@ defmodule Robot.Devices do
   """
   use Supervisor
   alias Robot.{Board, Names}
-  alias Robot.Control.{Executive, Pilot}
+  alias Robot.Control.Pilot
   alias Robot.Safety.Gate
 
   @roles [:blob_detector, :view, :saver, :drive, :ptz, :camera]
@@ -49,7 +49,6 @@ defmodule Robot.Devices do
         device(config, board, :drive, [
           write.(:drive),
           {Gate, :sense, [id]},
-          {Executive, :sense, [id]},
           {Pilot, :sense, [id]}
         ]) ++
         device(config, board, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++

@@ -121,8 +121,8 @@ defmodule Robot.Role do
   @doc """
   An input or an effect as a recording holds it: without those that wait, which are processes of that run.
 
-      iex> Robot.Role.recorded({:cast, {:halt, {Kernel, :send, [self(), :done]}}})
-      {:cast, {:halt, :recorded}}
+      iex> Robot.Role.recorded({:cast, {:halt, 1, {Kernel, :send, [self(), :done]}}})
+      {:cast, {:halt, 1, :recorded}}
       iex> Robot.Role.recorded({:ask, {self(), make_ref()}, :reset})
       {:ask, nil, :reset}
   """
@@ -133,7 +133,11 @@ defmodule Robot.Role do
   def recorded({:disarm, _then}), do: {:disarm, :recorded}
   def recorded(other), do: other
 
-  defp plain({kind, _then}) when kind in [:forget, :latch, :stand, :halt], do: {kind, :recorded}
+  defp plain({kind, _then}) when kind in [:forget, :latch], do: {kind, :recorded}
+
+  defp plain({kind, token, _then}) when kind in [:stand, :halt],
+    do: {kind, token, :recorded}
+
   defp plain({:confirm, _then, result}), do: {:confirm, :recorded, result}
   defp plain({:deliver, delivery, event}), do: {:deliver, %{delivery | reply: :recorded}, event}
   defp plain(message), do: message

@@ -22,11 +22,11 @@ defmodule Robot.MissionCase do
   """
   alias Hal.{Options, Pose}
   alias Robot.Mission.{Letter, Runner}
-  alias Sim.{Trial, World}
+  alias Sim.{Run, Trial, World}
   alias Swarm.{Member, Message, Missions}
 
-  @settle_ticks 30
-  @rest_ticks 50
+  @settle_ms 3_000
+  @rest_ms 5_000
   # How far a body may roll in the 5 s after that, metres.
   @still_m 0.02
 
@@ -86,22 +86,26 @@ defmodule Robot.MissionCase do
     same ++ first.wrong ++ junk(first) ++ stop(first.trial, mission)
   end
 
-  # The run with the digest of all that went in and out, its letters, and what was wrong.
+  # The end of a run with the digest of all that went in and out, its letters, and what was wrong.
   defp run(setup, options) do
-    half = options[:seconds] * 5
-    start = %{trial: Trial.begin(setup, record: true), digest: 0, letters: [], wrong: []}
-    middle = Enum.reduce(1..half, start, &tick(&2, &1, options))
-    dead = List.last(options[:robots])
-
-    killed =
-      if length(options[:robots]) > 1, do: Trial.kill(middle.trial, dead), else: middle.trial
-
-    last = Enum.reduce(1..half, %{middle | trial: killed}, &tick(&2, &1, options))
-    %{last | wrong: Enum.uniq(last.wrong ++ sizes(middle.trial, last.trial, options[:words]))}
+    half_ms = options[:seconds] * 500
+    seen = %{digest: 0, letters: [], wrong: []}
+    {middle, seen} = setup |> Trial.begin(record: true) |> follow(seen, half_ms, options)
+    killed? = length(options[:robots]) > 1
+    killed = if killed?, do: Trial.kill(middle, List.last(options[:robots])), else: middle
+    {last, seen} = follow(killed, seen, 2 * half_ms, options)
+    wrong = Enum.uniq(seen.wrong ++ sizes(middle, last, options[:words]))
+    Map.merge(seen, %{trial: %{last | entries: nil}, wrong: wrong})
   end
 
-  defp tick(run, n, options) do
-    {entries, trial} = run.trial |> Trial.step() |> Trial.take_entries()
+  defp follow(trial, seen, until_ms, options) do
+    over? = fn run, _seen -> Run.at_ms(run) >= until_ms end
+    {run, seen} = trial |> Run.new() |> Run.fold(seen, over?, &tick(&1, &2, &3, options))
+    {run.source, seen}
+  end
+
+  defp tick(_before, run, seen, options) do
+    {entries, trial} = Trial.take_entries(run.source)
 
     sent =
       for {:step, _id, _input, effects} <- entries, {:send, _to, message} <- effects, do: message
@@ -111,16 +115,16 @@ defmodule Robot.MissionCase do
           {:error, kind} <- [Message.check(message)],
           do: "it sends a #{kind} that is not whole"
 
-    always = if rem(n, 10) == 0, do: named(options[:always].(trial)), else: []
+    always = if rem(trial.at_ms, 1_000) == 0, do: named(options[:always].(trial)), else: []
     letters = for %Message{kind: :mission, body: letter} <- sent, do: letter
 
-    %{
-      run
-      | trial: trial,
-        digest: :erlang.phash2({run.digest, entries}),
-        letters: Enum.take(letters ++ run.letters, 20),
-        wrong: run.wrong ++ broken ++ always
+    seen = %{
+      digest: :erlang.phash2({seen.digest, entries}),
+      letters: Enum.take(letters ++ seen.letters, 20),
+      wrong: seen.wrong ++ broken ++ always
     }
+
+    {%{run | source: trial}, seen}
   end
 
   defp named(:ok), do: []
@@ -179,8 +183,8 @@ defmodule Robot.MissionCase do
   end
 
   defp stop(trial, {module, _options}) do
-    stopped = trial |> Trial.command(:all, :stop) |> steps(@settle_ticks)
-    rested = steps(stopped, @rest_ticks)
+    stopped = trial |> Trial.command(:all, :stop) |> later(@settle_ms)
+    rested = later(stopped, @rest_ms)
 
     states =
       for id <- Trial.living(rested),
@@ -195,7 +199,7 @@ defmodule Robot.MissionCase do
           moved > @still_m,
           do: "#{id} moves after a stop"
 
-    begun = rested |> Trial.command(:all, :start) |> steps(@settle_ticks)
+    begun = rested |> Trial.command(:all, :start) |> later(@settle_ms)
 
     idle =
       for id <- Trial.living(begun),
@@ -205,9 +209,5 @@ defmodule Robot.MissionCase do
     running ++ moving ++ idle
   end
 
-  defp steps(trial, count),
-    do:
-      Enum.reduce(1..count, trial, fn _, trial ->
-        trial |> Trial.step() |> Trial.take_entries() |> elem(1)
-      end)
+  defp later(%{at_ms: from_ms} = trial, ms), do: Run.play(trial, &(&1.at_ms >= from_ms + ms))
 end

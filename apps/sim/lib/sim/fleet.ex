@@ -9,7 +9,7 @@ defmodule Sim.Fleet do
   use GenServer
   alias Hal.{Pose, Ticker}
   alias Sim.Fleet.{Local, Mission, Nodes, Said}
-  alias Sim.{Radio, Scene, World}
+  alias Sim.{Moment, Radio, Scene, World}
   alias Sim.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
   alias Swarm.Commands.Client
   alias Swarm.EStop.Broadcaster
@@ -78,23 +78,8 @@ defmodule Sim.Fleet do
   @spec result(GenServer.server()) :: map()
   def result(fleet), do: GenServer.call(fleet, :result, :infinity)
 
-  @typedoc """
-  A fleet at one moment: the true world, what the living robots claim, the phases of their missions, and the parts of the radio in which robots
-  reach each other.
-  """
-  @type moment :: %{
-          at_ms: non_neg_integer(),
-          options: map(),
-          world: World.t(),
-          run_log: RunLog.t(),
-          claims: [{atom(), map()}],
-          phases: %{atom() => atom()},
-          parts: [[atom()]],
-          faults: Faults.t()
-        }
-
   @doc "The fleet as it was at its last look, a tenth of a second ago at most, for what judges a run."
-  @spec moment(GenServer.server()) :: moment()
+  @spec moment(GenServer.server()) :: Moment.t()
   def moment(fleet), do: GenServer.call(fleet, :moment, :infinity)
 
   @doc "Kills a robot, or the leader: all its processes at once, as if its power failed."
@@ -168,11 +153,8 @@ defmodule Sim.Fleet do
 
   def handle_call(:moment, _from, s) do
     claims = ask(s, :claims)
-    said = Faults.awake(s.faults, claims, now(s))
-    ids = Keyword.keys(said)
-    phases = for {id, _claim} <- claims, into: %{}, do: {id, phase(said, id)}
-    more = %{claims: said, phases: phases, parts: parts(s, ids) || [ids], faults: s.faults}
-    {:reply, s |> run() |> Map.delete(:messages) |> Map.merge(more), s}
+    parts = parts(s, s.faults |> Faults.awake(claims, now(s)) |> Keyword.keys())
+    {:reply, s |> run() |> Map.put(:faults, s.faults) |> Moment.of_processes(claims, parts), s}
   end
 
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
@@ -325,9 +307,6 @@ defmodule Sim.Fleet do
     {:ok, _pid} = Task.start(ask)
     s
   end
-
-  # What a robot claims says in which phase it is, but for one without a mission.
-  defp phase(said, id), do: if(claim = said[id], do: claim[:phase] || :idle, else: :frozen)
 
   # Puts into effect who is cut off from now on.
   defp cut(%{setup: %{options: options}} = s, now) do

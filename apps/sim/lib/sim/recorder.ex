@@ -13,7 +13,7 @@ defmodule Sim.Recorder do
   alias Mcap.Writer
   alias Hal.Frame
   alias Sim.Recorder.Camera
-  alias Sim.Recording
+  alias Sim.{Recording, Trial}
   alias Sim.Recording.{Pictures, Topics}
   alias Sim.Trial.Setup
 
@@ -57,6 +57,21 @@ defmodule Sim.Recorder do
     if rem(div(at_ms, 100), @ahead) == 0,
       do: GenServer.call(recorder, :reached, :infinity),
       else: :ok
+  end
+
+  @doc """
+  Records the step that a trial has made since `before`, with so many pictures a second of each robot (`nil`: none), and returns
+  the trial without what happened in it. A step that raised was none.
+  """
+  @spec step(pid(), before :: Trial.t(), Trial.t(), number() | nil) :: Trial.t()
+  def step(recorder, before, trial, pictures \\ nil)
+  def step(_recorder, trial, trial, _pictures), do: trial
+
+  def step(recorder, before, trial, pictures) do
+    {entries, trial} = Trial.take_entries(trial)
+    frames = Pictures.due(before, pictures)
+    :ok = tick(recorder, {trial.at_ms, entries}, Trial.scene(trial), frames)
+    trial
   end
 
   # Calls to a disk that may hang; the process that waits for it cannot say so. The commands that record are silent in the log.

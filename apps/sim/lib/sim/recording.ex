@@ -17,7 +17,7 @@ defmodule Sim.Recording do
   alias Sim.Trial
   alias Sim.Trial.Setup
 
-  @version 2
+  @version 3
   @start "/convoy/start"
   @ticks "/convoy/ticks"
   @encoding "erlang-term"

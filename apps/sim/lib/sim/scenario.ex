@@ -5,7 +5,8 @@ defmodule Sim.Scenario do
   """
   alias Hal.Options
   alias Hal.Options.{Suggest, Type}
-  alias Sim.Scenario.{Expectation, Names}
+  alias Sim.Check.Expectation
+  alias Sim.Scenario.Names
   alias Sim.Trial
   alias Sim.Trial.Event
 
@@ -14,7 +15,7 @@ defmodule Sim.Scenario do
   @typedoc """
   `options` are those of `Sim.Trial.Options` that were given, without `script`, in the order of that
   table; `robots` are names. `script` has events `{at_s, event}` (`Sim.Trial.Event`), `expect` has
-  expectations (`Sim.Scenario.Expectation`); both in the order in which they were given.
+  expectations (`Sim.Check.Expectation`); both in the order in which they were given.
   """
   @type t :: %__MODULE__{
           about: String.t(),
@@ -94,20 +95,12 @@ defmodule Sim.Scenario do
   @spec problems(keyword()) :: [Type.problem()]
   def problems(values) do
     %{robots: robots, duration_s: duration_s} = given = Map.merge(defaults(), Map.new(values))
-    script = Keyword.get(values, :script, [])
+    expect = Keyword.get(values, :expect, [])
+    timed = "no run in lockstep has hardware: serial lines have a time of their own"
 
-    options(given) ++
-      Event.problems(script, robots) ++
-      late(script, duration_s) ++ expected(Keyword.get(values, :expect, []), robots, duration_s)
-  end
-
-  defp options(given) do
     Trial.Options.problems(given) ++
-      for(
-        _id <- Enum.take(given.hardware, 1),
-        do:
-          {["hardware"], "no run in lockstep has hardware: serial lines have a time of their own"}
-      )
+      for(_id <- Enum.take(given.hardware, 1), do: {["hardware"], timed}) ++
+      late(given.script, duration_s) ++ expected(expect, robots, duration_s)
   end
 
   defp defaults, do: Map.new(Options.defaults(Trial.Options.table()))

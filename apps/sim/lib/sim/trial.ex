@@ -156,12 +156,12 @@ defmodule Sim.Trial do
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
     with :ok <- Setup.check_landmarks(trial.map, [place]),
-         do: {:ok, %{trial | script: Script.add_move(trial.script, place, trial.at_ms)}}
+         do: {:ok, %{trial | script: Script.add(trial.script, trial.at_ms, {:move, place})}}
   end
 
   @doc "Kills a robot, or the leader, now."
   @spec kill(t(), :leader | atom()) :: t()
-  def kill(trial, who), do: %{trial | script: Script.add_kill(trial.script, who, trial.at_ms)}
+  def kill(trial, who), do: %{trial | script: Script.add(trial.script, trial.at_ms, {:kill, who})}
 
   @doc "Sends a command to one living robot or to all; a frozen one does not get it."
   @spec command(t(), atom() | :all, term()) :: t()

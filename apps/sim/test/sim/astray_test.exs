@@ -2,7 +2,7 @@ defmodule Sim.AstrayTest do
   @moduledoc """
   Six robots that drive across each other's ways, each 0.7 to 1.4 m beside where it believes to be, which they know:
   `Robot.Behaviour.Avoid`, where walls are that nobody has told of, and the gate. `FIGURES=1 mix test --only long` prints what is in
-  docs/results.md.
+  docs/reports/recordings-and-chaos.md.
   """
   use Sim.LockstepCase, async: true
   @moduletag :slow

@@ -10,13 +10,11 @@ defmodule Sim.ExploreTest do
     trial
   end
 
-  defp run(trial), do: if(Trial.done?(trial), do: trial, else: run(Trial.step(trial)))
-
   defp map(trial, id), do: Swarm.Member.runner(Trial.robot(trial, id)).mission.map
 
   @tag :slow
   test "one robot explores the hall, and says so" do
-    trial = [robots: [:mag1], seed: 1] |> trial() |> run()
+    trial = [robots: [:mag1], seed: 1] |> trial() |> Sim.Run.play()
     assert Trial.formed?(trial)
     {width, height} = Sim.Floorplan.size(trial.map)
     # Without the walls, which are 0.2 m thick or more.
@@ -34,7 +32,9 @@ defmodule Sim.ExploreTest do
   end
 
   defp together(robots) do
-    trial = [robots: robots, seed: 2, loss: 0.2, kills: [{:mag2, 30}]] |> trial() |> run()
+    trial =
+      [robots: robots, seed: 2, loss: 0.2, kills: [{:mag2, 30}]] |> trial() |> Sim.Run.play()
+
     assert Trial.formed?(trial)
     areas = for id <- Trial.living(trial), do: SharedMap.area(map(trial, id))
     assert Enum.max(areas) - Enum.min(areas) < 0.03 * Enum.max(areas)
@@ -78,7 +78,7 @@ defmodule Sim.ExploreTest do
         map = lanes(Path.join(folder, "lanes#{metres}.pgm"), metres)
         begun = trial(robots: [:mag1], seed: seed, map: map, duration_s: 600)
         start = Hal.Pose.point(begun.world.robots[:mag1].pose)
-        trial = run(begun)
+        trial = Sim.Run.play(begun)
         %{share: share} = Trial.Coverage.of(trial, [start])
         assert share > 0.95 or not Trial.formed?(trial), inspect({metres, seed, share})
         assert Trial.result(trial).collisions == 0

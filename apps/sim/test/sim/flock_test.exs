@@ -1,7 +1,7 @@
 defmodule Sim.FlockTest do
   @moduledoc """
   The flock as a fleet carries it out, judged by true poses, which no robot sees. `FIGURES=1 mix test --only long` prints what
-  is in docs/results.md.
+  is in docs/reports/flock.md.
   """
   use ExUnit.Case, async: true
   alias Hal.Pose

@@ -2,7 +2,7 @@ defmodule Sim.GateAloneTest do
   @moduledoc """
   Six robots that drive across each other's ways without looking, with nothing but the gate's limits
   (`Robot.Safety.Reflex`) between their wishes and their wheels. `FIGURES=1 mix test --only long` prints what is in
-  docs/results.md.
+  docs/reports/avoidance.md.
   """
   use Sim.LockstepCase, async: true
   @moduletag :slow

@@ -1,7 +1,7 @@
 defmodule Sim.NotOnPlanTest do
   @moduledoc """
   Robots with a floor plan in a building that differs from it: `Robot.Navigation.KnownWalls`. `FIGURES=1 mix test --only long`
-  prints what is in docs/results.md.
+  prints what is in docs/reports/avoidance.md.
   """
   use Sim.LockstepCase, async: true
   @moduletag :slow

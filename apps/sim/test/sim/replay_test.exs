@@ -139,7 +139,7 @@ defmodule Sim.ReplayTest do
       other = :erlang.term_to_binary({:convoy, version, %{}})
 
       assert Recording.read_start(other) ==
-               {:error, "is a recording of version #{version}; this program reads version 2"}
+               {:error, "is a recording of version #{version}; this program reads version 3"}
     end
   end
 

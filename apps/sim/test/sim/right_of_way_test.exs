@@ -1,7 +1,7 @@
 defmodule Sim.RightOfWayTest do
   @moduledoc """
   Robots that meet where only one fits: `Robot.Behaviour.Avoid.RightOfWay`. `FIGURES=1 mix test --only long` prints what is
-  in docs/results.md.
+  in docs/reports/avoidance.md.
   """
   use Sim.LockstepCase, async: true
   @moduletag :slow

@@ -4,7 +4,7 @@ defmodule Sim.TrialRuns do
   say so.
   """
   import ExUnit.Assertions
-  alias Sim.Trial
+  alias Sim.{Run, Trial}
 
   @doc "Runs a trial to its end; blobs are computed directly unless the options say otherwise."
   def run(options) do
@@ -13,11 +13,10 @@ defmodule Sim.TrialRuns do
   end
 
   @doc "Continues a trial to its end."
-  def to_the_end(trial), do: until(trial, &Trial.done?/1)
+  def to_the_end(trial), do: trial |> Run.play() |> spoken()
 
   @doc "Continues a trial until a condition holds."
-  def until(trial, condition),
-    do: if(condition.(trial), do: spoken(trial), else: until(Trial.step(trial), condition))
+  def until(trial, condition), do: trial |> Run.play(condition) |> spoken()
 
   defp spoken(trial) do
     assert Trial.result(trial).stuck == [],

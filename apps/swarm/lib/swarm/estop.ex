@@ -365,8 +365,10 @@ defmodule Swarm.EStop do
   # As `Robot.Control.Pilot.halt_at_once/2`. Requests from before this stop begin nothing after it
   # (`Swarm.Order.Freshness`, `Robot.Control.Pilot`).
   defp halt(then, seen) do
+    token = {:estop, seen.us}
+
     [{:put, :stopped, seen.us}, {:cast, :gate, {:forget, nil}}] ++
-      [{:cast, :executive, :hold}, {:cast, :pilot, {:halt, then}}]
+      [{:cast, :executive, {:hold, token}}, {:cast, :pilot, {:halt, token, then}}]
   end
 
   # Answers an e-stop once the gate is latched, and once that is in its file, if it has one; or that gate or disk take too long.

@@ -282,7 +282,7 @@ defmodule Swarm.CommsTest do
     # One heartbeat from another node in its name, with the lowest number of a life.
     assert {%{left?: true} = name, [_, _ | told]} = NameClaim.rival(name, {0, :twin@far}, nil, 0)
     duplicate = {:event, [:swarm, :comms, :duplicate_id], %{other: :twin@far}}
-    assert told == [{:cast, :pilot, {:halt, nil}}, duplicate]
+    assert told == [{:cast, :pilot, {:halt, nil, nil}}, duplicate]
     assert {^name, []} = NameClaim.look(name, false, 9_999)
     # Later lives, and itself, do not count; as long as the first is heard, it stays away.
     assert {^name, []} = NameClaim.rival(name, {2_000, :twin@far}, nil, 9_999)

@@ -15,7 +15,7 @@ defmodule Vision.Saver do
     * `:view` - the `Vision.View` to watch
     * `:name` - as in `GenServer`
 
-  A picture is written under another name and then renamed, so that nobody finds half of one. A
+  A picture is written under another name and then renamed, so that no reader finds half of one. A
   failure (a full disk, a folder that is gone) is reported once by `[:vision, :saver, :failed]`
   and shown by `status/1`. The saver tries again after 1 s, 2 s, … up to 30 s; when it succeeds,
   `[:vision, :saver, :healed]` follows. A slow disk delays only this process: it requests the next

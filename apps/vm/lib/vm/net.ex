@@ -1,8 +1,8 @@
 defmodule Vm.Net do
   @moduledoc """
   Builds a network of our own on this machine: a namespace with two bridges (the switch), and one for each robot, with a
-  cable to the switch and no route but that to its network. Nothing of it is seen outside, and it goes with whoever made
-  it, however that ends. Guests have namespaces and cables as robots do, and belong to nobody's fleet.
+  cable to the switch and no route but that to its network. Nothing of it is seen outside, and it goes with the process that made
+  it, however that ends. Guests have namespaces and cables as robots do, and belong to no fleet.
 
       net = Vm.Net.create([:mag1, :mag2, :mag3], folder)
       Vm.Net.split(net, [[:mag1, :mag2], [:mag3]])
@@ -51,7 +51,7 @@ defmodule Vm.Net do
     end
   end
 
-  # Some containers have a root who may not.
+  # Some containers have a root that may not.
   defp try_one(name) do
     bridge = ~w(-n #{name} link add br0 type bridge)
     rule = ~w(netns exec #{name} iptables -A INPUT) ++ loss(0.2)
@@ -71,7 +71,7 @@ defmodule Vm.Net do
     end
   end
 
-  @doc "Makes a network of these robots and guests, all of whom reach all. The folder goes with it."
+  @doc "Makes a network of these robots and guests, each of which reaches all. The folder goes with it."
   @spec create([atom(), ...], Path.t(), [atom()]) :: t()
   def create(robots, folder, guests \\ []) do
     prefix = "convoy#{random()}"

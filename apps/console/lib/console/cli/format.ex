@@ -217,7 +217,7 @@ defmodule Console.Cli.Format do
   end
 
   defp state(%{state: :estop}), do: "held by the emergency stop"
-  defp state(%{state: :unsure}), do: "in its slot, but not sure of its place,"
+  defp state(%{state: :unsure}), do: "not sure of its place,"
   defp state(%{state: state}), do: state
 
   @doc """

@@ -14,7 +14,6 @@ defmodule Console.Live.Trial do
   alias Console.Prompt
   alias Robot.Command
   alias Sim.{Recorder, Trial}
-  alias Sim.Recording.Pictures
   alias Swarm.Commands
   alias Swarm.Missions.Text
   @behaviour Console.Live
@@ -139,21 +138,17 @@ defmodule Console.Live.Trial do
 
   @impl GenServer
   def handle_info({:step, tick}, %{tick: tick} = state) do
-    trial = state.trial |> state.module.step() |> record(state.trial, state.recorder)
+    trial = record(state.recorder, state.trial, state.module.step(state.trial))
     state = %{state | trial: trial, pace: Pace.stepped(state.pace, Hal.Clock.now_ms())}
     {:noreply, schedule(state, state.due_ms)}
   end
 
   def handle_info({:step, _former}, state), do: {:noreply, state}
 
-  defp record(trial, _before, nil), do: trial
+  defp record(nil, _before, trial), do: trial
 
-  defp record(trial, before, {recorder, pictures}) do
-    {entries, trial} = Trial.take_entries(trial)
-    frames = Pictures.due(before, pictures)
-    :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial), frames)
-    trial
-  end
+  defp record({recorder, pictures}, before, trial),
+    do: Recorder.step(recorder, before, trial, pictures)
 
   # A message for each step, so that commands come between two of them, however fast it goes.
   defp schedule(%{tick: tick} = state, last_ms) do

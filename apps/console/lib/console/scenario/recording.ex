@@ -10,22 +10,15 @@ defmodule Console.Scenario.Recording do
   def record(%Scenario{} = scenario, path) do
     with {:ok, setup} <- Trial.setup(Scenario.trial(scenario)),
          {:ok, recorder} <- Recorder.start_link(path, setup) do
-      scenario |> Runner.begin(Trial.begin(setup, record: true)) |> play(recorder)
+      run = Runner.begin(scenario, Trial.begin(setup, record: true))
+      Runner.play(scenario, run, run.source, &step(&1, &2, recorder))
       Recorder.close(recorder)
     end
   end
 
-  defp play(run, recorder) do
-    unless Runner.done?(run) do
-      before_ms = run.trial.at_ms
-      run = Runner.step(run)
-      {entries, trial} = Trial.take_entries(run.trial)
-      # A step that raised was none.
-      if trial.at_ms > before_ms,
-        do: :ok = Recorder.tick(recorder, {trial.at_ms, entries}, Trial.scene(trial))
-
-      play(%{run | trial: trial}, recorder)
-    end
+  defp step(run, before, recorder) do
+    trial = Recorder.step(recorder, before, run.source)
+    {%{run | source: trial}, trial}
   end
 
   @doc """

@@ -4,7 +4,7 @@ defmodule Console.Scenario.Session do
   # printed as a whole in the order of the arguments; in real time one after the other.
   alias Console.Cli.{Format, Output}
   alias Console.Scenario.{Options, Recording, Report}
-  alias Sim.{Scenario, Scene, Trial}
+  alias Sim.{Run, Scenario, Scene}
   alias Sim.Scenario.Runner
 
   @doc """
@@ -37,10 +37,10 @@ defmodule Console.Scenario.Session do
     names = results |> Enum.map(&elem(&1, 0)) |> Recording.names()
 
     errors =
-      for {{file, {:ok, run}}, name} <- Enum.zip(results, names),
+      for {{file, {:ok, {scenario, _run}}}, name} <- Enum.zip(results, names),
           {^file, at_s} <- failed,
           path = Path.join(options.record, name),
-          {:error, line} <- [Recording.record(run.scenario, path) |> told(path, at_s, output)],
+          {:error, line} <- [Recording.record(scenario, path) |> told(path, at_s, output)],
           do: line
 
     if errors == [], do: 2, else: {:error, errors}
@@ -54,14 +54,17 @@ defmodule Console.Scenario.Session do
   defp told({:error, line}, _path, _at_s, _output), do: {:error, "--record #{line}"}
 
   defp open(file) do
-    with {:ok, scenario} <- Scenario.File.load(file),
-         {:error, line} <- Runner.new(scenario),
-         do: {:error, ["#{file}: #{line}"]}
+    with {:ok, scenario} <- Scenario.File.load(file), {:ok, run} <- Runner.new(scenario) do
+      {:ok, {scenario, run}}
+    else
+      {:error, line} when is_binary(line) -> {:error, ["#{file}: #{line}"]}
+      problems -> problems
+    end
   end
 
   defp play(runs, %{live: true} = options) do
     {:ok, _apps} = Application.ensure_all_started(:swarm)
-    failed = Enum.flat_map(runs, &in_real_time(&1, options))
+    failed = Enum.flat_map(runs, &alone(&1, options))
 
     if length(runs) > 1,
       do: IO.puts(Report.total(length(runs), Enum.map(failed, &elem(&1, 0))))
@@ -69,16 +72,9 @@ defmodule Console.Scenario.Session do
     failed
   end
 
-  defp play([{file, run}], options) do
+  defp play([run], options) do
     Sim.Trial.Memory.prepare()
-    output = Output.to(:stdio)
-    unless options.quiet, do: tell(Report.heading(file, run.scenario, run.trial), output)
-    now_ms = Hal.Clock.now_ms()
-    run = live(run, %{output: output, quiet: options.quiet, told: 0, drawn_ms: now_ms})
-    Output.finish(output)
-    verdicts = Runner.verdicts(run)
-    tell(shown(verdicts, options) ++ [summary(file, run, verdicts)], output)
-    failed(file, verdicts)
+    alone(run, options)
   end
 
   defp play(runs, options) do
@@ -106,24 +102,25 @@ defmodule Console.Scenario.Session do
     failed
   end
 
-  defp in_real_time({file, %{scenario: scenario, trial: trial}}, options) do
+  # With its stages as they happen.
+  defp alone({file, {scenario, run}}, options) do
     output = Output.to(:stdio)
-    unless options.quiet, do: tell(Report.heading(file, scenario, trial), output)
-    now_ms = Hal.Clock.now_ms()
-    view = %{output: output, quiet: options.quiet, told: 0, drawn_ms: now_ms}
+    unless options.quiet, do: tell(Report.heading(file, scenario, run.source), output)
+    view = %{output: output, quiet: options.quiet, told: 0, drawn_ms: Hal.Clock.now_ms()}
 
-    shown = fn at_ms, stages, checks, view ->
-      view
-      |> news(stages)
-      |> draw(at_ms / 1000, Scenario.duration_s(scenario), checks)
+    play = fn run ->
+      {run, _view} =
+        Runner.play(scenario, run, show(scenario, run, view), &{&1, show(scenario, &1, &2)})
+
+      ended(file, run)
     end
 
-    ended = Scenario.Live.run(scenario, view, shown)
+    ended = if options.live, do: Runner.live(scenario, play), else: {:ok, play.(run)}
     Output.finish(output)
 
     case ended do
-      {:ok, _result, at_s, verdicts} ->
-        tell(shown(verdicts, options) ++ [Report.summary(file, at_s, verdicts)], output)
+      {:ok, {verdicts, last}} ->
+        tell(shown(verdicts, options) ++ [last], output)
         failed(file, verdicts)
 
       {:error, line} ->
@@ -132,23 +129,23 @@ defmodule Console.Scenario.Session do
     end
   end
 
-  # A run that is over is large: only what is printed of it comes back from its process.
-  defp whole({file, run}) do
+  defp whole({file, {scenario, run}}) do
     Sim.Trial.Memory.prepare()
-    heading = Report.heading(file, run.scenario, run.trial)
-    run = finish(run)
-    verdicts = Runner.verdicts(run)
-
-    {file, heading ++ Enum.map(stages(run), &Format.stage/1), verdicts,
-     summary(file, run, verdicts)}
+    heading = Report.heading(file, scenario, run.source)
+    {run, nil} = Runner.play(scenario, run)
+    {verdicts, last} = ended(file, run)
+    {file, heading ++ Enum.map(Run.stages(run), &Format.stage/1), verdicts, last}
   end
 
-  defp finish(run), do: if(Runner.done?(run), do: run, else: run |> Runner.step() |> finish())
+  defp ended(file, run) do
+    {_result, verdicts} = Runner.verdicts(run)
+    {verdicts, Report.summary(file, Run.at_ms(run) / 1000, verdicts)}
+  end
 
-  defp live(run, view) do
-    at_s = run.trial.at_ms / 1000
-    view = view |> news(stages(run)) |> draw(at_s, Scenario.duration_s(run.scenario), run.checks)
-    if Runner.done?(run), do: run, else: run |> Runner.step() |> live(view)
+  defp show(scenario, run, view) do
+    view
+    |> news(Run.stages(run))
+    |> draw(Run.at_ms(run) / 1000, Scenario.duration_s(scenario), run.checks)
   end
 
   defp news(%{quiet: true} = view, _stages), do: view
@@ -174,9 +171,6 @@ defmodule Console.Scenario.Session do
         String.slice("#{done} of #{count} scenarios", 0, output.columns - 1)
       )
 
-  defp stages(run), do: Trial.scene(run.trial).stages
-  defp at_s(run), do: run.trial.at_ms / 1000
-  defp summary(file, run, verdicts), do: Report.summary(file, at_s(run), verdicts)
   defp held?(verdicts), do: not Enum.any?(verdicts, &(&1.held? == false))
 
   defp shown(verdicts, %{quiet: true}),

@@ -28,7 +28,7 @@ defmodule Hal.Camera.FFmpeg do
       #{Enum.map_join(Source.pixel_formats(), ", ", &"`#{inspect(&1)}`")}. The compressed ones
       need less USB bandwidth, but time to decompress
 
-  A V4L2 option that is left out keeps the setting of whoever used the device last.
+  A V4L2 option that is left out keeps the setting of the device's last user.
 
   ffmpeg runs behind the port program `newest_frame`, which keeps one frame and sends it when
   `next/1` asks, so nothing queues. ffmpeg ends with this process or its VM, however they end.

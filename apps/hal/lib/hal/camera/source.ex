@@ -11,7 +11,7 @@ defmodule Hal.Camera.Source do
   | `"lavfi:GRAPH"` | any other generator of ffmpeg |
   | anything else | a video file or a picture |
 
-  A filter graph can read and write files with the rights of whoever runs it, and so can some of
+  A filter graph can read and write files with the rights of its user, and so can some of
   ffmpeg's protocols. A source may come from somebody else, so `refused/1` lets pass what can only
   be read: known schemes, and single generators that have no option for a file.
   """

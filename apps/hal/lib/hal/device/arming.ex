@@ -11,7 +11,7 @@ defmodule Hal.Device.Arming do
   With the policy `:manual` (real robots) only a person arms: after each start, each loss of the
   line, and each time that the drive was not ready. With `:auto` (simulated robots) the drive arms
   by itself, and a loss of the line is not an error; after a person has disarmed it, only a person
-  arms it again. With `:never` nobody can arm it: a dry run.
+  arms it again. With `:never` it cannot be armed: a dry run.
 
   A drive is ready while its line is open, its driver says so (`c:Hal.Drive.ready/1`) and its
   base's reports are fresh (`Hal.Device.Reports`). `why` says what is missing, or is `nil`.

@@ -1,6 +1,6 @@
 defmodule Hal.Device.Confirmation do
   @moduledoc """
-  Answers those who wait to hear whether what a drive was told has a base behind it (`Hal.Device.confirm/3`). Runs in
+  Answers callers that wait to hear whether what a drive was told has a base behind it (`Hal.Device.confirm/3`). Runs in
   the device's process.
 
   A line that is open and takes bytes proves nothing: its program may be frozen, its cable cut. The next report of the
@@ -30,7 +30,7 @@ defmodule Hal.Device.Confirmation do
     s
   end
 
-  @doc "Takes readings: a report of the wheels answers all who wait."
+  @doc "Takes readings: a report of the wheels answers all that wait."
   @spec heard(State.t(), [term()]) :: State.t()
   def heard(%{confirmations: none} = s, _readings) when none == %{}, do: s
 

@@ -122,7 +122,7 @@ defmodule Hal.Device.Lifecycle do
     end
   end
 
-  # Whoever releases the emergency button of a base must not set it going.
+  # Releasing the emergency button of a base must not set it going.
   defp stood(%{kind: :drive, obedience: %{late?: true}} = s),
     do: become(s, Arming.stood(s.arming))
 

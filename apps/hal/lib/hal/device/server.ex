@@ -125,7 +125,7 @@ defmodule Hal.Device.Server do
     |> Requests.ask()
   end
 
-  # Whoever asked has been told by then that nothing was done, and may stand in front of the
+  # The caller has been told by then that nothing was done, and may stand in front of the
   # robot.
   defp order(s, order, until_ms) do
     if Hal.Clock.now_ms() < until_ms,

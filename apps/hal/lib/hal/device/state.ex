@@ -44,7 +44,7 @@ defmodule Hal.Device.State do
   `retry_ms` is the wait after the next failure; `retry`, `watchdog` and `listening` identify the
   timers that still count. `due_ms` is when it is to judge next, and until `patient_ms` silence does
   not count, because it has been asleep itself (`System.monotonic_time/1`, ms). `confirmations` are the timers and replies of
-  those who wait for a report.
+  callers that wait for a report.
   """
   @type t :: %__MODULE__{
           kind: Hal.Device.kind(),

@@ -2,7 +2,7 @@ defmodule Hal.Options.Suggest do
   @moduledoc "Suggests what an unknown word may have meant. Pure."
 
   @near_enough 0.77
-  # Longer words (in bytes) are not compared: nobody means them, and comparing takes time.
+  # Longer words (in bytes) are not compared: they are no typing errors, and comparing takes time.
   @longest 255
 
   @doc """

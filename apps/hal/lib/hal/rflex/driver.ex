@@ -51,7 +51,7 @@ defmodule Hal.RFlex.Driver do
   Odometry continues where it was when a lost line is opened again in the same process; a new
   process starts at zero, in a new frame (`Hal.Odometry`). When a counter jumps
   (`Hal.RFlex.Sensors.Odometry`), the pose stays where it is and continues in a new frame, because
-  nobody knows how far the robot went meanwhile.
+  the way that the robot went meanwhile is unknown.
 
   A controller that sends no wheel report for 0.5 s is set up again, every second, because it may
   have been switched off and on; one that sends no packet at all for 2 s is the error `:silent`.

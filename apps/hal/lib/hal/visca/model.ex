@@ -42,7 +42,7 @@ defmodule Hal.Visca.Model do
           tilt_rate: pos_integer()
         }
 
-  # Cameras that say who they are, and have no head, or one that turns in other units.
+  # Cameras that name their model, and have no head, or one that turns in other units.
   @others %{
     0x0401 => "FCB-IX47",
     0x0404 => "FCB-IX10",

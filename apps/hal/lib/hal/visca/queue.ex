@@ -10,7 +10,7 @@ defmodule Hal.Visca.Queue do
 
   | event | reaction |
   |---|---|
-  | no answer for 120 ms | sends the command again, 5 times in all; a cancel, `:address_set` and `:if_clear` 2 times; an inquiry (whoever asks, asks again), a relative step and a toggle only once; not if a newer command overrides it |
+  | no answer for 120 ms | sends the command again, 5 times in all; a cancel, `:address_set` and `:if_clear` 2 times; an inquiry (its caller repeats it), a relative step and a toggle only once; not if a newer command overrides it |
   | nothing at all heard for 1 s, though something was sent | `:no_answer` |
   | both sockets are busy, and a command waits | cancels the older one if it has become pointless, or an unknown one, or waits |
   | a drive during another move | cancels the move first: the D30 refuses the drive otherwise |

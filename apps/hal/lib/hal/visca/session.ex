@@ -37,7 +37,7 @@ defmodule Hal.Visca.Session do
   @lost_ms 2_000
   @zoom_each 5
   @on_ms 3_000
-  # A device that gives no reading for 10 s is closed, and nobody would learn why.
+  # A device that gives no reading for 10 s is closed, and the reason would be lost.
   @opening_ms 9_000
   # A damaged message can look like a refusal, or like another number.
   @refusals 5

@@ -1,7 +1,7 @@
 defmodule Mcap.FileWriter.Folder do
   @moduledoc false
   # Keeps the numbered files of a folder, `run-0001.mcap` and so on, which never exceed a limit together: the oldest are
-  # deleted. Files of other names are nobody's business here: they neither count nor are deleted. Pure but for `list/1`.
+  # deleted. Files of other names neither count nor are deleted. Pure but for `list/1`.
 
   @type file :: {number :: pos_integer(), bytes :: non_neg_integer()}
 

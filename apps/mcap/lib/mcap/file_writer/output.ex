@@ -3,7 +3,7 @@ defmodule Mcap.FileWriter.Output do
   Writes to a file; or, with a limit, to a folder of numbered files. All functions return the error as one line; the
   file then ends with the last chunk that was written whole, finished if that is still possible.
 
-  `Mcap.FileWriter` is the process around it. Who has one already calls it from there.
+  `Mcap.FileWriter` is the process around it. A process that has one already calls it from there.
   """
   alias Mcap.FileWriter.{Disk, Folder}
   alias Mcap.Writer

@@ -8,7 +8,7 @@ defmodule Mesh.Protocol.Rejections do
   # What anybody may send, and not only nodes of the fleet from their own addresses.
   @strange [:unsigned, :not_ours, :version, :foreign]
 
-  @doc "Time: each second begins to count anew what nobody of the fleet has sent."
+  @doc "Resets the count of non-members' datagrams each second."
   @spec tick(Mesh.Protocol.t(), integer()) :: Mesh.Protocol.t()
   def tick(protocol, now_ms), do: count(protocol, div(now_ms, 1_000))
 

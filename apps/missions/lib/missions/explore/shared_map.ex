@@ -4,8 +4,7 @@ defmodule Missions.Explore.SharedMap do
   # these say nothing, what others told last. Pure.
   #
   # Robots tell each other tiles of 1.6 x 1.6 m, two bits a cell: those in which they have seen something new, and in turn a few
-  # of all that they know, of whomever. So who missed a message, or came later, has all of it after a while, and what a robot
-  # has told is not lost with it.
+  # tiles of everything known, from any source, so latecomers catch up, and what a robot has told is not lost with it.
   alias Hal.Pose
   alias Robot.Navigation.MapFile.Writer
   alias Robot.Navigation.Survey

@@ -4,7 +4,8 @@ defmodule Missions.Landmark.Claim do
 
   `epoch` is that of the election which it knows; `sight` its newest view of the landmark, relative size in millionths and
   estimated distance in mm, `nil` if it does not see it; `sd` the uncertainty of its place in its leader's frame, `nil` outside
-  it. `blind` says that its camera has given no picture for long, `in_place` that a follower is in its slot, `unsure` that it believes so but is not sure enough, `blocked` that it
+  it. `blind` says that its camera has given no picture for long, `in_place` that a follower is in its slot, `unsure` that it believes so but is not sure
+  enough, or that it is on its way and does not know its place to within a metre, `blocked` that it
   does not get there, `formed` that all do. `sees` is a robot without pictures that it sees, and where. Only a leader has an `anchor`.
   """
   alias Missions.Landmark.Reference

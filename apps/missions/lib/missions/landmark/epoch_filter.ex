@@ -1,10 +1,10 @@
 defmodule Missions.Landmark.EpochFilter do
   @moduledoc false
-  # Leaves out of the mission who claims an epoch that no fleet can have reached
-  # (`Swarm.Agreement.Round.Epochs`), because a robot that believed it would count on from there. Pure.
+  # Excludes robots that claim an impossible epoch (`Swarm.Agreement.Round.Epochs`), because a robot that
+  # believed it would count on from there. Pure.
   #
-  # Such a robot stays a peer, which others avoid, but counts as one without a mission, so nobody
-  # waits for it, and nobody follows it. The event `:refused` names it and says what is allowed, at
+  # Such a robot stays a peer, which others avoid, but counts as one without a mission: no robot waits
+  # for it or follows it. The event `:refused` names it and says what is allowed, at
   # most once in 10 s for each robot. As soon as its epochs are possible, it takes part again.
   alias Swarm.Agreement.Round
   alias Swarm.Membership.Heartbeat

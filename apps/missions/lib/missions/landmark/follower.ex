@@ -7,7 +7,8 @@ defmodule Missions.Landmark.Follower do
   # Meanwhile it looks at the landmark, because a round may ask next how large it sees it.
   #
   # A follower that stands in its slot by its own estimate, but does not know its place well enough
-  # to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked.
+  # to say so (`Missions.Landmark.Marks.sure?/2`), is `unsure?`: neither in place nor blocked. So is one on its way
+  # that knows its place less well than to a metre: it cannot tell whether it comes nearer.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Follower.{Facing, Guide, Progress}
@@ -18,6 +19,7 @@ defmodule Missions.Landmark.Follower do
   @lease_ms 1_000
   @in_place 0.25
   @near 0.15
+  @sure 1.0
   @slow 0.05
   # The camera looks at the landmark and at the robot ahead in turn.
   @gaze_ms 1_500
@@ -90,17 +92,19 @@ defmodule Missions.Landmark.Follower do
     {told, place} = pass_on(mission)
     {leader, _twist} = SlotPoses.leader(mission.anchor, age_ms)
     follower = mission.follower
+    progress = Progress.note(follower.progress, mission, slot, error, there?)
+    vague? = not progress.blocked? and vague?(mission.percept)
 
     follower = %{
       follower
       | in_place?: there? and sure?,
-        unsure?: there? and not sure?,
+        unsure?: if(there?, do: not sure?, else: vague?),
         holding?: resting? and error <= @near,
         told: told,
         # Remembers where the landmark stood when this robot was last in place, or began to
         # follow.
         landmark: landmark(mission, there?),
-        progress: Progress.note(follower.progress, mission, slot, error, there?),
+        progress: progress,
         guide: Guide.note(follower.guide, mission, there? and sure?),
         facing: Facing.note(follower.facing, mission, slot, where(error, there?, sure?), leader)
     }
@@ -116,6 +120,9 @@ defmodule Missions.Landmark.Follower do
 
     {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
   end
+
+  defp vague?(%{uncertainty: %{radius: radius}}), do: radius > @sure
+  defp vague?(_percept), do: false
 
   defp target(%{facing: facing, guide: guide}, mission, slot, leader) do
     ahead = SlotPoses.landmark(mission.anchor) || Pose.point(leader)

@@ -38,10 +38,11 @@ defmodule Missions.Landmark.SelfReport do
     }
   end
 
-  # A follower that is in its slot by its own estimate, but not certain enough to say so.
-  defp says(%{phase: :follow, follower: %{unsure?: true}, percept: percept}) do
+  # A follower that is in its slot or under way by its own estimate, but not certain enough to say so.
+  defp says(%{phase: :follow, follower: %{unsure?: true} = follower, percept: percept}) do
     within = with metres when metres != nil <- uncertainty(percept), do: within(metres)
-    "in its slot, but NOT SURE of its place#{within}"
+    where = if follower.facing.unsure_ms, do: "in its slot, but", else: "on its way, but"
+    "#{where} NOT SURE of its place#{within}"
   end
 
   defp says(%{phase: :lead} = mission), do: Loss.says(mission)

@@ -12,7 +12,7 @@ defmodule Missions.Landmark.SlotPoses do
 
   @ahead_ms 500
   @default_distance 1.2
-  # An anchor is good for so long (docs/architecture.md, table of times).
+  # An anchor is good for so long (docs/times.md).
   @fresh_ms 1_000
 
   @doc "The leader's pose and speed from an anchor that is `age_ms` old."

@@ -29,8 +29,9 @@ defmodule Missions.Landmark.UnsureTest do
   defp stand(off, radius, seconds, grid \\ nil),
     do: watch(fn _seconds -> off end, radius, seconds, grid)
 
-  # The same of one that comes nearer: `off` is a function of the seconds. Its wheels turn as it does, or not.
-  defp watch(off, radius, seconds, grid \\ nil, wheels \\ :turn) do
+  # The same of one that comes nearer: `off` is a function of the seconds. Its wheels turn as it does, or not, or all the time.
+  # `swung` is how much nearer its slot is than it was at first.
+  defp watch(off, radius, seconds, grid \\ nil, wheels \\ :turn, swung \\ fn _seconds -> 0.0 end) do
     mission = mission(phase: :follow, leader: :mag1, epoch: 1, follower: Follower.new())
 
     uncertainty = %{
@@ -47,7 +48,7 @@ defmodule Missions.Landmark.UnsureTest do
         leader: :mag1,
         epoch: 1,
         sequence: tick + 1,
-        pose: {round(off.(tick / 10) * 1000) + 1000, 0, 0},
+        pose: {round((off.(0.0) - swung.(tick / 10)) * 1000) + 1000, 0, 0},
         twist: {0, 0},
         formation: @column,
         order: [:mag2],
@@ -57,9 +58,18 @@ defmodule Missions.Landmark.UnsureTest do
         still: true
       }
 
-      driven = if wheels == :turn, do: off.(0.0) - off.(tick / 10), else: 0.0
-      odometry = %Odometry{pose: Pose.new(driven, 0), twist: Twist.zero()}
-      percept = percept(at_ms: now, uncertainty: uncertainty, grid: grid, odometry: odometry)
+      pose = Pose.new(off.(0.0) - off.(tick / 10), 0)
+      driven = %{turn: pose, stand: Pose.new(0, 0), always: Pose.new(tick / 50, 0)}[wheels]
+
+      percept =
+        percept(
+          at_ms: now,
+          pose: pose,
+          uncertainty: uncertainty,
+          grid: grid,
+          odometry: %Odometry{pose: driven, twist: Twist.zero()}
+        )
+
       mission = %{mission | anchor: anchor, anchor_ms: now, percept: percept, now_ms: now}
       {mission, _effects} = Follower.act(mission)
       mission
@@ -94,6 +104,11 @@ defmodule Missions.Landmark.UnsureTest do
   test "a robot that is still on its way, or does not get there, is not unsure" do
     assert %{unsure?: false} = stand(0.6, 0.62, 1)
     assert %{unsure?: false, progress: %{blocked?: true}} = stand(0.6, 0.62, 16)
+  end
+
+  test "one on its way that knows its place less well than to a metre is unsure" do
+    assert %{unsure?: false} = watch(&(6.0 - 0.2 * &1), 0.9, 1)
+    assert %{unsure?: true} = watch(&(6.0 - 0.2 * &1), 1.1, 1)
   end
 
   test "heartbeats carry the word unsure, and no other value in its place" do
@@ -134,6 +149,14 @@ defmodule Missions.Landmark.UnsureTest do
     assert %{progress: %{blocked?: true}, in_place?: false, unsure?: false} = watch(off, 1.3, 16)
     # A robot that is sure has come nearer twice.
     assert %{progress: %{blocked?: false}} = watch(off, 0.1, 16)
+  end
+
+  # One that swings past it, as when its leader turns, leaves it nearer to nothing.
+  test "a slot that comes nearer by itself is no progress" do
+    swung = fn seconds -> if seconds in [6.0, 6.1], do: 0.4, else: 0.0 end
+    still = fn _seconds -> 2.5 end
+    assert %{progress: %{blocked?: false}} = watch(still, 0.1, 14, nil, :always, swung)
+    assert %{progress: %{blocked?: true}} = watch(still, 0.1, 16, nil, :always, swung)
   end
 
   test "a robot that drives is not blocked, however unsure it is of its place" do

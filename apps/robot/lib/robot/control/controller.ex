@@ -11,8 +11,8 @@ defmodule Robot.Control.Controller do
   else where the mission last ordered it.
 
   In addition to its behaviour's own options a goal takes `discs: [{x, y, radius}]`: standing
-  obstacles to avoid, in the map frame, metres; and `unmapped: true`, that an echo which stays where it is may be a wall that
-  nobody knows (`Robot.Behaviour.Avoid`).
+  obstacles to avoid, in the map frame, metres; and `unmapped: true`: treat a stationary echo as an unmapped wall
+  (`Robot.Behaviour.Avoid`).
   """
   alias Hal.Profile
   alias Robot.{Localiser, Mission, Percept, Wish}

@@ -9,8 +9,12 @@ defmodule Robot.Control.Executive do
   kills it.
 
   A goal is for now: while the wheels may not turn it is refused (`Robot.Safety.Readiness`), and when
-  they are disarmed, by whatever, it is dropped, so that arming starts nothing. An executive that is held (`hold/1`) refuses
+  they are disarmed, by whatever, it is dropped, so that arming starts nothing. An executive that is held (`hold/2`) refuses
   goals while a mission is being ended; a robot that is held is one that an e-stop holds (`docs/glossary.md`).
+
+  Each halt has a token. Its sender tells executive and pilot, and the pilot tells the executive when it has ended the
+  mission. Erlang promises no order between the two senders, so a `{:stand, token, then}` may arrive before its
+  `{:hold, token}`: the executive remembers such tokens, and ignores their holds.
 
   It starts idle: its state contains the goal, which a crash loses. At its start it makes the gate
   drop the wish of its predecessor.
@@ -24,13 +28,16 @@ defmodule Robot.Control.Executive do
   alias Robot.Safety.{DryRun, Readiness}
 
   @call_ms 400
+  # Tokens remembered of halts that are over, but whose hold has not arrived.
+  @remembered 16
 
   @enforce_keys [:robot, :profile, :dry_run, :head?, :notes?, :controller, :departure]
-  defstruct @enforce_keys ++ [told: nil, held?: false, tick: 0]
+  defstruct @enforce_keys ++ [told: nil, holds: [], stood: [], tick: 0]
 
   @typedoc """
   `head?` says whether there is a head to turn, `notes?` whether a file notes that the robot has left its start pose;
-  `departure` is what is noted of that, `told` the last line of a dry run.
+  `departure` is what is noted of that, `told` the last line of a dry run. `holds` are the tokens of the halts that hold
+  the executive, `stood` those of halts that ended before their hold arrived, newest first.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -41,14 +48,18 @@ defmodule Robot.Control.Executive do
           controller: Controller.t(),
           departure: {:was | :near, Departure.frame() | nil} | :noted,
           told: String.t() | nil,
-          held?: boolean(),
+          holds: [token()],
+          stood: [token()],
           tick: non_neg_integer()
         }
+
+  @typedoc "Identifies a halt: any term that no other halt of the robot has."
+  @type token :: term()
 
   @doc """
   Sets, changes or (`nil`) drops the goal, as in `Robot.Control.Controller.goal/3`. The error is a
   line: no such robot runs on this node, the goal is not a behaviour, or it does not accept these
-  options, the wheels may not turn now, a mission is being ended (`hold/1`), or the executive has not
+  options, the wheels may not turn now, a mission is being ended (`hold/2`), or the executive has not
   answered within 400 ms.
   """
   @spec goal(robot :: atom(), tag :: term(), {module(), keyword()} | nil) ::
@@ -73,23 +84,19 @@ defmodule Robot.Control.Executive do
 
   @doc """
   Drops the goal at once, and every goal that comes until the pilot, which is told to end the
-  mission at the same time, says `stand/2`. A mission that runs late, or hangs, could otherwise
-  set a goal after the stop. Until then nothing is confirmed.
-  """
-  @spec hold(robot :: atom()) :: :ok
-  def hold(robot), do: cast(robot, :hold)
+  mission at the same time, casts `{:stand, token, then}`. A mission that runs late, or hangs, could
+  otherwise set a goal after the stop. Until then nothing is confirmed.
 
-  @doc """
-  Drops the goal and all other orders of the mission, and makes the gate drop the wish, after all
-  earlier wishes of the executive; then the gate applies `then`. Ends `hold/1`.
+  `{:stand, token, then}` drops the goal and all other orders of the mission, and makes the gate drop the wish, after all
+  earlier wishes of the executive; then the gate applies `then`. The token `:all` is that of a pilot that starts: it ends
+  every hold.
   """
-  @spec stand(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
-  def stand(robot, then \\ nil), do: cast(robot, {:stand, then})
+  @spec hold(robot :: atom(), token()) :: :ok
+  def hold(robot, token), do: cast(robot, {:hold, token})
 
-  @doc "A sink for the drive: holds the executive (`hold/1`) when the wheels are disarmed."
-  @spec sense(robot :: atom(), reading :: tuple()) :: :ok
-  def sense(robot, {:arming, %{state: state}}) when state != :armed, do: cast(robot, :disarmed)
-  def sense(_robot, _reading), do: :ok
+  @doc "Holds the executive as `hold/2` does, because the wheels are disarmed; a dry run goes on."
+  @spec disarmed(robot :: atom(), token()) :: :ok
+  def disarmed(robot, token), do: cast(robot, {:disarmed, token})
 
   defp cast(robot, message), do: GenServer.cast(Names.via(robot, :executive), message)
 
@@ -144,23 +151,41 @@ defmodule Robot.Control.Executive do
   def handle({:cast, {:obey, order}}, _at_ms, s, board),
     do: if(refusal(order, s, board), do: {s, []}, else: obeyed(s, order))
 
-  def handle({:cast, {:confirm, _then, _result}}, _at_ms, %{held?: true} = s, _board), do: {s, []}
+  def handle({:cast, {:confirm, _then, _result}}, _at_ms, %{holds: [_ | _]} = s, _board),
+    do: {s, []}
 
   def handle({:cast, {:confirm, then, result}}, _at_ms, s, _board),
     do: {s, [{:apply, then, [result]}]}
 
-  def handle({:cast, :hold}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
-  def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
+  def handle({:cast, {:hold, token}}, _at_ms, s, _board), do: held(s, token)
+  def handle({:cast, {:disarmed, _token}}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
   # The pilot, which is told too, ends the mission; one that hangs may still set a goal meanwhile.
-  def handle({:cast, :disarmed}, _at_ms, s, _board), do: drop(%{s | held?: true}, nil)
+  def handle({:cast, {:disarmed, token}}, _at_ms, s, _board), do: held(s, token)
 
-  def handle({:cast, {:stand, then}}, _at_ms, s, _board), do: drop(%{s | held?: false}, then)
+  def handle({:cast, {:stand, token, then}}, _at_ms, s, _board), do: drop(stood(s, token), then)
 
   def handle(_unknown, _at_ms, _s, _board), do: :unknown
 
+  # A halt that is over: a mission that has begun since keeps its goal.
+  defp held(s, token) do
+    if token in s.stood,
+      do: {%{s | stood: List.delete(s.stood, token)}, []},
+      else: drop(%{s | holds: [token | s.holds]}, nil)
+  end
+
+  defp stood(s, :all), do: %{s | holds: [], stood: []}
+  # A halt without a hold.
+  defp stood(s, nil), do: s
+
+  defp stood(s, token) do
+    if token in s.holds,
+      do: %{s | holds: List.delete(s.holds, token)},
+      else: %{s | stood: Enum.take([token | s.stood], @remembered)}
+  end
+
   defp answered({s, effects}, from), do: {s, effects ++ [{:answer, from, :ok}]}
 
-  defp refusal({:goal, _tag, {_module, _options}}, %{held?: true}, _board),
+  defp refusal({:goal, _tag, {_module, _options}}, %{holds: [_ | _]}, _board),
     do: {:error, "its mission is being ended"}
 
   defp refusal({:goal, _tag, {_module, _options}}, s, board) do

@@ -74,7 +74,7 @@ defmodule Robot.Control.Pilot do
   """
   @spec halt(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def halt(robot, then \\ nil),
-    do: GenServer.cast(Names.via(robot, :pilot), {:halt, then})
+    do: GenServer.cast(Names.via(robot, :pilot), {:halt, nil, then})
 
   @doc """
   Tells gate, executive and pilot at once to end what the robot does, so that one that hangs does not
@@ -83,9 +83,10 @@ defmodule Robot.Control.Pilot do
   """
   @spec halt_at_once(robot :: atom(), then :: Robot.Config.call() | nil) :: :ok
   def halt_at_once(robot, then) do
+    token = System.unique_integer()
     :ok = Gate.forget(robot)
-    :ok = Executive.hold(robot)
-    halt(robot, then)
+    :ok = Executive.hold(robot, token)
+    GenServer.cast(Names.via(robot, :pilot), {:halt, token, then})
   end
 
   @doc """
@@ -123,10 +124,13 @@ defmodule Robot.Control.Pilot do
   @spec hear(robot :: atom(), Robot.Mission.event() | {:walls, Grid.Packed.t() | nil}) :: :ok
   def hear(robot, event), do: GenServer.cast(Names.via(robot, :pilot), event)
 
-  @doc "A sink for the drive: ends the mission when the wheels are disarmed."
+  @doc "A sink for the drive: holds the executive and ends the mission when the wheels are disarmed."
   @spec sense(robot :: atom(), reading :: tuple()) :: :ok
-  def sense(robot, {:arming, %{state: state}}) when state != :armed,
-    do: GenServer.cast(Names.via(robot, :pilot), :disarmed)
+  def sense(robot, {:arming, %{state: state}}) when state != :armed do
+    token = System.unique_integer()
+    :ok = Executive.disarmed(robot, token)
+    GenServer.cast(Names.via(robot, :pilot), {:disarmed, token})
+  end
 
   def sense(_robot, _reading), do: :ok
 
@@ -154,7 +158,7 @@ defmodule Robot.Control.Pilot do
       since_ms: at_ms
     }
 
-    {s, [{:delete, :asking} | dropped()] ++ [{:cast, :executive, {:stand, nil}}] ++ told(s)}
+    {s, [{:delete, :asking} | dropped()] ++ [{:cast, :executive, {:stand, :all, nil}}] ++ told(s)}
   end
 
   # Walls that the sonars see come from the executive.
@@ -187,7 +191,7 @@ defmodule Robot.Control.Pilot do
       do: answered(begin(module, options, at_ms, s, board), from, s)
 
   def handle({:ask, from, :stop}, at_ms, s, _board),
-    do: idle(s, from && {GenServer, :reply, [from, :ok]}, at_ms)
+    do: idle(s, nil, from && {GenServer, :reply, [from, :ok]}, at_ms)
 
   def handle({:ask, from, :resume}, at_ms, s, board),
     do: answered(go(:resume, {:command, :start}, at_ms, s, board), from, s)
@@ -201,13 +205,13 @@ defmodule Robot.Control.Pilot do
   def handle({:ask, from, {:command, _command} = event}, at_ms, s, board),
     do: answered(go({:hand, s.runner.module}, event, at_ms, s, board), from, s)
 
-  def handle({:cast, {:halt, then}}, at_ms, s, _board), do: idle(s, then, at_ms)
+  def handle({:cast, {:halt, token, then}}, at_ms, s, _board), do: idle(s, token, then, at_ms)
 
-  def handle({:cast, :disarmed}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
+  def handle({:cast, {:disarmed, _token}}, _at_ms, %{dry_run: true} = s, _board), do: {s, []}
 
-  def handle({:cast, :disarmed}, at_ms, s, _board) do
+  def handle({:cast, {:disarmed, token}}, at_ms, s, _board) do
     told = if s.runner.module, do: [{:stage, :disarmed, %{}}], else: []
-    {s, effects} = idle(s, nil, at_ms)
+    {s, effects} = idle(s, token, nil, at_ms)
     {s, told ++ effects}
   end
 
@@ -339,9 +343,9 @@ defmodule Robot.Control.Pilot do
   end
 
   # The board says idle before the answer.
-  defp idle(s, then, at_ms) do
+  defp idle(s, token, then, at_ms) do
     {s, effects} = changed(%{s | runner: Runner.halt(s.runner)}, at_ms)
-    {s, effects ++ [{:cast, :executive, {:stand, then}}]}
+    {s, effects ++ [{:cast, :executive, {:stand, token, then}}]}
   end
 
   defp follow({runner, effects}, at_ms, s) do

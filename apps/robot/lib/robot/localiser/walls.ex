@@ -29,7 +29,7 @@ defmodule Robot.Localiser.Walls do
   # The standard deviation of a range (metres), several times that of a sonar, and how exact a plan is.
   @sd 0.15
   @exact 0.04
-  # A pose that is less sure than this (metres, radians) may expect other walls than those that it hears. It is corrected
+  # Above this uncertainty (metres, radians) an echo may be matched to the wrong wall. Such a pose is corrected only
   # once readings have shown that it was right all the same, as well as those of a pose that is known by `@right`.
   @vague {1.0, 0.8}
   @right 0.3

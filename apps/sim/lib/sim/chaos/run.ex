@@ -1,7 +1,7 @@
 defmodule Sim.Chaos.Run do
   @moduledoc "Plays one run of `mix chaos` from its options to its violations. Pure."
-  alias Sim.{Invariants, Trial}
-  alias Sim.Invariants.Violation
+  alias Sim.Check.{Invariants, Violation}
+  alias Sim.{Run, Trial}
 
   @typedoc """
   What became of a run: its violations, and figures for the table. `claims` counts those that can be
@@ -24,11 +24,8 @@ defmodule Sim.Chaos.Run do
   @doc "Plays a run to its end; the error is one line of `Sim.Trial.new/1`."
   @spec play(keyword()) :: {:ok, outcome()} | {:error, String.t()}
   def play(options) do
-    with {:ok, trial} <- Trial.new(Map.new(options)) do
-      {trial, judge} = go_on(trial, Invariants.new(trial), fn _judge -> false end)
-      result = Trial.result(trial)
-      {:ok, outcome(Invariants.finish(judge, result), trial, result)}
-    end
+    with {:ok, trial} <- Trial.new(Map.new(options)),
+         do: {:ok, trial |> judged(&Run.done?/1) |> outcome()}
   end
 
   @doc """
@@ -46,34 +43,34 @@ defmodule Sim.Chaos.Run do
   @doc "The same of a run that was set up."
   @spec first_of(Trial.t(), atom()) :: Violation.t() | nil
   def first_of(%Trial{} = trial, invariant) do
-    done? = &Invariants.violated?(&1, invariant)
-    {trial, judge} = go_on(trial, Invariants.new(trial), done?)
-    judge = if done?.(judge), do: judge, else: Invariants.finish(judge, Trial.result(trial))
+    found? = fn %{checks: [judge]} -> Invariants.first(judge, invariant) != nil end
+    run = judged(trial, &(Run.done?(&1) or found?.(&1)))
+    [judge] = run.checks
+    judge = if found?.(run), do: judge, else: Invariants.finish(judge, Run.result(run))
     Invariants.first(judge, invariant)
   end
 
-  defp go_on(trial, judge, enough?) do
-    if Trial.done?(trial) or Invariants.violated?(judge, :crash) or enough?.(judge) do
-      {trial, judge}
-    else
-      {trial, judge} = Invariants.step(judge, trial)
-      go_on(trial, judge, enough?)
-    end
-  end
+  defp judged(trial, over?),
+    do: trial |> Run.new([Invariants.new(trial.options)], guarded?: true) |> Run.play(over?)
 
-  defp outcome(judge, trial, result) do
+  defp outcome(%{checks: [judge]} = run) do
+    result = Run.result(run)
+    judge = Invariants.finish(judge, result)
+
     judged =
       for claim <- result.claims, (right? = Invariants.right?(judge, claim)) != nil, do: right?
+
+    told = Enum.frequencies_by(result.stages, & &1.stage)
 
     %{
       violations: Invariants.violations(judge),
       simulated_s: result.simulated_s,
       robots: result.robots,
-      elections: Enum.count(result.stages, &(&1.stage == :elected)),
-      kills: Enum.count(result.stages, &(&1.stage == :killed)),
+      elections: Map.get(told, :elected, 0),
+      kills: Map.get(told, :killed, 0),
       partitions: length(result.agreement.heals),
-      formed?: Enum.any?(result.stages, &(&1.stage == :formed)),
-      ended_formed?: Trial.formed?(trial),
+      formed?: is_map_key(told, :formed),
+      ended_formed?: Trial.formed?(run.source),
       claims: length(judged),
       true_claims: Enum.count(judged, & &1),
       rivals_s: result.agreement.rivals_max_s

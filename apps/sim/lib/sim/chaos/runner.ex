@@ -3,9 +3,8 @@ defmodule Sim.Chaos.Runner do
   Plays many runs side by side, and shrinks each violation. The result does not depend on how many
   are played at once.
   """
-  alias Sim.Chaos.{Draw, Isolated, Run, Shrink}
-  alias Sim.Invariants
-  alias Sim.Invariants.Violation
+  alias Sim.Chaos.{Draw, Run, Shrink}
+  alias Sim.Check.{Invariants, Violation}
 
   # A run that violates many invariants mostly has one cause.
   @most_shrunk 2
@@ -60,7 +59,7 @@ defmodule Sim.Chaos.Runner do
 
   @doc """
   Whether runs are clean together: no violation, but for false claims, of which the goal of
-  `Sim.Invariants.goal/0` allows some among many.
+  `Sim.Check.Invariants.goal/0` allows some among many.
   """
   @spec clean?([played()]) :: boolean()
   def clean?(runs) do
@@ -96,10 +95,24 @@ defmodule Sim.Chaos.Runner do
   end
 
   defp attempt(run) do
-    case Isolated.call(fn -> Run.play(run) end) do
+    case isolated(fn -> Run.play(run) end) do
       {:ok, {:ok, outcome}} -> {outcome, outcome.violations}
       {:ok, {:error, line}} -> {nil, [Violation.new(:crash, 0, [], "not a run: " <> line)]}
       {:exit, reason} -> {nil, [Violation.crash(0, reason)]}
+    end
+  end
+
+  # In a process of its own, so that what it raises is a finding and not the end.
+  defp isolated(function) do
+    {pid, monitor} =
+      spawn_monitor(fn ->
+        Sim.Trial.Memory.prepare()
+        exit({:chaos_value, Sim.Run.attempt(function)})
+      end)
+
+    receive do
+      {:DOWN, ^monitor, :process, ^pid, {:chaos_value, result}} -> result
+      {:DOWN, ^monitor, :process, ^pid, reason} -> {:exit, reason}
     end
   end
 
@@ -121,7 +134,7 @@ defmodule Sim.Chaos.Runner do
 
   # A run that cannot even be set up raises outside its steps.
   defp again(run, invariant) do
-    case Isolated.call(fn -> Run.first(run, invariant) end) do
+    case isolated(fn -> Run.first(run, invariant) end) do
       {:ok, violation} -> violation
       {:exit, reason} -> if invariant == :crash, do: Violation.crash(0, reason)
     end

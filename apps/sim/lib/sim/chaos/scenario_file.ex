@@ -3,7 +3,7 @@ defmodule Sim.Chaos.ScenarioFile do
   Writes a failing run as a scenario (`Sim.Scenario`): its text says what was violated, and it expects that it never is. Pure.
   """
   alias Sim.Chaos.Runner
-  alias Sim.Invariants.Violation
+  alias Sim.Check.Violation
   alias Sim.Scenario
 
   @doc "The file's name and text of a failure of a seed."

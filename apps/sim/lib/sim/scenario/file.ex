@@ -16,8 +16,9 @@ defmodule Sim.Scenario.File do
   once each key by itself is right.
   """
   alias Robot.File.{Reader, Terms}
-  alias Sim.{Invariants, Scenario}
-  alias Sim.Scenario.{Expectation, Names, Text}
+  alias Sim.Check.{Expectation, Invariants}
+  alias Sim.Scenario
+  alias Sim.Scenario.{Names, Text}
 
   @doc """
   The scenario of the file at `path`, or the problems with it, those that its map shows among them.

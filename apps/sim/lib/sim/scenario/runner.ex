@@ -1,82 +1,66 @@
 defmodule Sim.Scenario.Runner do
   @moduledoc """
-  Runs a scenario in lockstep and judges what it expects, as a fold. Pure.
+  Runs a scenario and judges what it expects: in lockstep, as a fold, or in real time on a fleet of processes (`Sim.Fleet`). The
+  world and the events are the same; times of a fleet are those of this machine, so two of its runs are not the same.
 
   A run ends when all expectations are decided, when those that are left concern the whole run, have been judged for 5 s
   and the fleet is calm (`Sim.Trial.done?/1`), or when its time is up. One that ends at a time keeps it alive until then.
   A run that raises does so here, too, but where a scenario expects that it does not: then it ends.
+
+  In real time nothing is said of invariants that are judged by what is inside processes (`Sim.Check.Kind`).
   """
-  alias Sim.{Invariants, Scenario, Trial}
-  alias Sim.Scenario.{Check, View}
-
-  @enforce_keys [:scenario, :trial, :judge, :checks]
-  defstruct @enforce_keys
-
-  @type t :: %__MODULE__{
-          scenario: Scenario.t(),
-          trial: Trial.t(),
-          judge: Invariants.t(),
-          checks: [Check.t()]
-        }
-
-  @doc "A run at its beginning; the error is one line."
-  @spec new(Scenario.t()) :: {:ok, t()} | {:error, line :: String.t()}
-  def new(%Scenario{} = scenario) do
-    with {:ok, trial} <- Trial.new(Scenario.trial(scenario)), do: {:ok, begin(scenario, trial)}
-  end
-
-  @doc "The same with a trial that was made of the scenario's options, as one that is recorded."
-  @spec begin(Scenario.t(), Trial.t()) :: t()
-  def begin(%Scenario{} = scenario, trial) do
-    checks = Enum.map(scenario.expect, &Check.new/1)
-
-    %__MODULE__{
-      scenario: scenario,
-      trial: trial,
-      judge: Invariants.new(trial),
-      checks: checks
-    }
-  end
-
-  @doc "Advances the run by 100 ms."
-  @spec step(t()) :: t()
-  def step(%__MODULE__{} = run) do
-    {trial, judge} = advance(run)
-    view = View.of(trial)
-    checks = Enum.map(run.checks, &Check.tick(&1, view, judge))
-    %{run | trial: trial, judge: judge, checks: checks}
-  end
-
-  defp advance(%{scenario: %{expect: expect}, judge: judge, trial: trial}) do
-    if {:never, :crash} in expect do
-      Invariants.step(judge, trial)
-    else
-      trial = Trial.step(trial)
-      {trial, Invariants.note(judge, trial)}
-    end
-  end
+  alias Sim.{Check, Fleet, Run, Scenario, Trial}
 
   # As long as a fleet has to be calm.
   @judged_s 5
 
-  @doc "Whether the run is over."
-  @spec done?(t()) :: boolean()
-  def done?(%__MODULE__{trial: trial, checks: checks} = run) do
-    Invariants.violated?(run.judge, :crash) or
-      over?(run.scenario, checks, trial.at_ms / 1000, fn -> Trial.done?(trial) end)
+  @doc "A run at its beginning; the error is one line."
+  @spec new(Scenario.t()) :: {:ok, Run.t()} | {:error, line :: String.t()}
+  def new(%Scenario{} = scenario),
+    do:
+      with({:ok, trial} <- Trial.new(Scenario.trial(scenario)), do: {:ok, begin(scenario, trial)})
+
+  @doc "The same of a trial that was made of the scenario's options, as one that is recorded, or of a fleet."
+  @spec begin(Scenario.t(), Run.source()) :: Run.t()
+  def begin(%Scenario{expect: expect}, source) do
+    guarded? = {:never, :crash} in expect and not is_pid(source)
+    Run.new(source, Enum.map(expect, &Check.new/1), guarded?: guarded?)
   end
 
-  @doc "Whether a run is over at this second, by its checks; `done?` says whether its fleet has nothing left to do."
-  @spec over?(Scenario.t(), [Check.t()], at_s :: number(), done? :: (... -> boolean())) ::
-          boolean()
-  def over?(scenario, checks, at_s, done?) do
+  @doc "Runs it on a fleet, and ends the fleet; the error, also of a fleet that has ended before its time, is one line."
+  @spec live(Scenario.t(), (Run.t() -> answer)) :: {:ok, answer} | {:error, line :: String.t()}
+        when answer: term()
+  def live(scenario, play) do
+    with {:ok, fleet} <- Fleet.start_link(Scenario.trial(scenario)) do
+      try do
+        answer = play.(begin(scenario, fleet))
+        if line = Fleet.ended(fleet), do: {:error, line}, else: {:ok, answer}
+      after
+        Fleet.stop(fleet)
+      end
+    end
+  end
+
+  @doc "Plays it to its end. After each step `each` gets the run and what it returned last."
+  @spec play(Scenario.t(), Run.t(), memory, (Run.t(), memory -> {Run.t(), memory})) ::
+          {Run.t(), memory}
+        when memory: term()
+  def play(scenario, run, memory \\ nil, each \\ &{&1, &2}),
+    do:
+      Run.fold(run, memory, fn run, _ -> done?(scenario, run) end, fn _, run, m ->
+        each.(run, m)
+      end)
+
+  defp done?(scenario, %{checks: checks} = run) do
+    at_s = Run.at_ms(run) / 1000
     left = Enum.filter(checks, &(&1.status in [:open, :holding]))
 
     cond do
-      at_s >= Scenario.duration_s(scenario) -> true
+      Run.crashed?(run) or at_s >= Scenario.duration_s(scenario) -> true
       checks != [] and left == [] -> true
+      is_pid(run.source) and Fleet.ended(run.source) != nil -> true
       Enum.any?(left, &wanted?(&1, at_s)) -> false
-      true -> done?.()
+      true -> Run.done?(run)
     end
   end
 
@@ -84,16 +68,15 @@ defmodule Sim.Scenario.Runner do
   defp wanted?(%{window: {from_s, :end}}, at_s), do: at_s < from_s + @judged_s
   defp wanted?(_until_a_time, _at_s), do: true
 
-  @doc "The verdicts if the run ended now, in the order of the expectations."
-  @spec verdicts(t()) :: [Check.verdict()]
-  def verdicts(%__MODULE__{trial: trial, checks: checks} = run) do
-    judge = Invariants.finish(run.judge, Trial.result(trial))
-
-    for check <- checks, do: Check.verdict(check, trial.at_ms / 1000, judge)
+  @doc "The report (`Sim.Trial.result/1`) and the verdicts if the run ended now, in the order of the expectations."
+  @spec verdicts(Run.t()) :: {result :: map(), [Check.verdict()]}
+  def verdicts(run) do
+    result = Run.result(run)
+    {result, for(check <- run.checks, do: Check.verdict(check, Run.at_ms(run) / 1000, result))}
   end
 
   @doc """
-  A whole run: the report (`Sim.Trial.result/1`) and the verdicts.
+  A whole run in lockstep: the report and the verdicts.
 
       iex> {:ok, scenario} = Sim.Scenario.new(options: [robots: 1, duration_s: 1], expect: [{:never, :collision}, {:formed, by_s: 0.5}])
       iex> {:ok, result, [safe, formed]} = Sim.Scenario.Runner.run(scenario)
@@ -104,10 +87,9 @@ defmodule Sim.Scenario.Runner do
           {:ok, result :: map(), [Check.verdict()]} | {:error, line :: String.t()}
   def run(%Scenario{} = scenario) do
     with {:ok, run} <- new(scenario) do
-      run = finish(run)
-      {:ok, Trial.result(run.trial), verdicts(run)}
+      {run, nil} = play(scenario, run)
+      {result, verdicts} = verdicts(run)
+      {:ok, result, verdicts}
     end
   end
-
-  defp finish(run), do: if(done?(run), do: run, else: run |> step() |> finish())
 end

@@ -35,17 +35,16 @@ defmodule Sim.Trial.AgreementMetrics do
         }
 
   @doc """
-  One tick: the claims of the living robots, each with its `role` (`t:Robot.Mission.role/0`), the parts they are in, and the robots that stand
-  because the mission says so.
+  One tick: the claims of the living robots, each with its `role` (`t:Robot.Mission.role/0`), who leads in which part
+  (`Sim.Trial.RunLog.leaders/2`), and the robots that stand because the mission says so.
   """
-  @spec note(t(), integer(), [{atom(), map()}], [[atom()]], [atom()]) :: t()
-  def note(agreement, at_ms, claims, parts, standing) do
-    leaders = for {id, %{role: :leads}} <- claims, do: id
-
+  @spec note(t(), integer(), [{atom(), map()}], [{part, leaders}], [atom()]) :: t()
+        when part: [atom()], leaders: [atom()]
+  def note(agreement, at_ms, claims, led, standing) do
     agreement
-    |> rivals(at_ms, parts, leaders)
-    |> heal(at_ms, length(parts), leaders)
-    |> follow(at_ms, parts, claims, standing)
+    |> rivals(at_ms, led)
+    |> heal(at_ms, led)
+    |> follow(at_ms, led, claims, standing)
   end
 
   @doc "For the report: seconds, oldest first."
@@ -69,8 +68,8 @@ defmodule Sim.Trial.AgreementMetrics do
   defp seconds(nil), do: nil
   defp seconds(ms), do: ms / 1000
 
-  defp rivals(agreement, at_ms, parts, leaders) do
-    if Enum.any?(parts, fn part -> Enum.count(leaders, &(&1 in part)) > 1 end) do
+  defp rivals(agreement, at_ms, led) do
+    if Enum.any?(led, &match?({_part, [_, _ | _]}, &1)) do
       since = agreement.rivals_ms || at_ms
       worst = max(agreement.rivals_worst_ms, at_ms - since + 100)
       %{agreement | rivals_ms: since, rivals_worst_ms: worst}
@@ -79,26 +78,26 @@ defmodule Sim.Trial.AgreementMetrics do
     end
   end
 
-  defp heal(%{parts: before} = agreement, at_ms, parts, leaders)
-       when before != nil and parts < before do
+  defp heal(%{parts: before} = agreement, at_ms, led)
+       when before != nil and length(led) < before do
     heal = %{
       at_ms: at_ms,
-      leaders: length(leaders),
+      leaders: led |> Enum.map(fn {_part, leaders} -> length(leaders) end) |> Enum.sum(),
       one_ms: nil,
       formed_ms: nil,
       stood_ms: nil,
       stands_ms: nil
     }
 
-    %{agreement | parts: parts, heals: [heal | agreement.heals]}
+    %{agreement | parts: length(led), heals: [heal | agreement.heals]}
   end
 
-  defp heal(agreement, _at_ms, parts, _leaders), do: %{agreement | parts: parts}
+  defp heal(agreement, _at_ms, led), do: %{agreement | parts: length(led)}
 
-  defp follow(%{heals: []} = agreement, _at_ms, _parts, _claims, _standing), do: agreement
+  defp follow(%{heals: []} = agreement, _at_ms, _led, _claims, _standing), do: agreement
 
-  defp follow(%{heals: [heal | older]} = agreement, at_ms, parts, claims, standing) do
-    one? = length(parts) == 1 and one?(claims)
+  defp follow(%{heals: [heal | older]} = agreement, at_ms, led, claims, standing) do
+    one? = match?([_whole], led) and one?(claims)
     formed? = one? and Enum.any?(claims, fn {_id, claim} -> claim[:formed] == true end)
     past = at_ms - heal.at_ms
     heal = if one?, do: %{heal | one_ms: heal.one_ms || past}, else: heal

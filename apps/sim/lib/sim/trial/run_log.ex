@@ -101,6 +101,7 @@ defmodule Sim.Trial.RunLog do
   def note(run_log, at_ms, claims, parts \\ nil, standing \\ []) do
     parts = parts || [for({id, _claim} <- claims, do: id)]
     claims = for {id, claim} <- claims, do: {id, Map.put(claim, :role, role(run_log, claim))}
+    led = leaders(claims, parts)
     leaders = for {id, %{role: :leads} = claim} <- claims, do: {id, claim}
     # A mission without a leader has what it wants when every robot says so.
     formed? =
@@ -114,8 +115,8 @@ defmodule Sim.Trial.RunLog do
       | leader: highest(leaders),
         epoch:
           Enum.reduce(claims, run_log.epoch, fn {_id, claim}, e -> max(e, claim[:epoch] || 0) end),
-        leaders_at_once_max: max(run_log.leaders_at_once_max, at_once(leaders, parts)),
-        agreement: AgreementMetrics.note(run_log.agreement, at_ms, claims, parts, standing),
+        leaders_at_once_max: max(run_log.leaders_at_once_max, at_once(led)),
+        agreement: AgreementMetrics.note(run_log.agreement, at_ms, claims, led, standing),
         searching?: Enum.any?(claims, &match?({_id, %{role: :searches}}, &1)),
         ticks: run_log.ticks + if(elected?, do: 1, else: 0),
         formed_ticks: run_log.formed_ticks + if(elected? and formed?, do: 1, else: 0),
@@ -163,6 +164,21 @@ defmodule Sim.Trial.RunLog do
   @spec role(t(), claim :: map()) :: Robot.Mission.role() | nil
   def role(run_log, claim), do: run_log.roles[claim[:phase]]
 
+  @doc """
+  Who leads in which part of the radio, by claims that each have their `role`: all that speaks of two leaders at once asks
+  this. Parts that cannot reach each other each have their own leader.
+
+      iex> claims = [mag1: %{role: :leads}, mag2: %{role: :leads}, mag3: %{role: :follows}]
+      iex> Sim.Trial.RunLog.leaders(claims, [[:mag1, :mag3], [:mag2]])
+      [{[:mag1, :mag3], [:mag1]}, {[:mag2], [:mag2]}]
+  """
+  @spec leaders([{atom(), map()}], parts) :: [{part :: [atom()], leaders :: [atom()]}]
+        when parts: [[atom()]]
+  def leaders(claims, parts) do
+    leaders = for {id, %{role: :leads}} <- claims, do: id
+    for part <- parts, do: {part, Enum.filter(part, &(&1 in leaders))}
+  end
+
   @doc "What such a claim says (`c:Robot.Mission.account/1`)."
   @spec account(t(), claim :: map()) :: Robot.Mission.account()
   def account(run_log, claim), do: Robot.Mission.account(run_log.mission, claim)
@@ -188,12 +204,8 @@ defmodule Sim.Trial.RunLog do
   def share_formed(%{ticks: 0}), do: 0.0
   def share_formed(run_log), do: run_log.formed_ticks / run_log.ticks
 
-  # Within one part: parts that cannot reach each other each have their own leader.
-  defp at_once(leaders, parts) do
-    parts
-    |> Enum.map(fn part -> Enum.count(leaders, fn {id, _claim} -> id in part end) end)
-    |> Enum.max(fn -> 0 end)
-  end
+  defp at_once(led),
+    do: led |> Enum.map(fn {_part, leaders} -> length(leaders) end) |> Enum.max(fn -> 0 end)
 
   defp highest([]), do: nil
 

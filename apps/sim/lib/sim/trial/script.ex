@@ -23,13 +23,9 @@ defmodule Sim.Trial.Script do
     put(%__MODULE__{pending: Enum.sort(old)}, for({at_s, event} <- events, do: {ms(at_s), event}))
   end
 
-  @doc "Adds a move."
-  @spec add_move(t(), Hal.Pose.point(), integer()) :: t()
-  def add_move(script, place, at_ms), do: put(script, [{at_ms, {:move, place}}])
-
-  @doc "Adds a kill."
-  @spec add_kill(t(), atom(), integer()) :: t()
-  def add_kill(script, who, at_ms), do: put(script, [{at_ms, {:kill, who}}])
+  @doc "Adds an event."
+  @spec add(t(), integer(), Event.t()) :: t()
+  def add(script, at_ms, event), do: put(script, [{at_ms, event}])
 
   defp put(script, events),
     do: %{script | pending: Enum.sort_by(script.pending ++ events, &elem(&1, 0))}

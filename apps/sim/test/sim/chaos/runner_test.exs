@@ -2,10 +2,8 @@ defmodule Sim.Chaos.RunnerTest do
   use Sim.LockstepCase, async: true
   @moduletag :slow
   alias Sim.Chaos.{Draw, Runner, ScenarioFile}
-  alias Sim.Invariants.Violation
+  alias Sim.Check.Violation
   alias Sim.Scenario
-
-  doctest Sim.Chaos.Isolated
 
   # Small fleets for a short time, so that some runs take seconds.
   defp small(seed, number) do

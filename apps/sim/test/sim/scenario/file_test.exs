@@ -2,7 +2,7 @@ defmodule Sim.Scenario.FileTest do
   use ExUnit.Case, async: true
   alias Sim.Scenario
   doctest Sim.Scenario
-  doctest Sim.Scenario.Expectation
+  doctest Sim.Check.Expectation
   doctest Sim.Scenario.File
   doctest Sim.Scenario.Names
   doctest Sim.Scenario.Runner

@@ -1,7 +1,8 @@
 defmodule Sim.Scenario.LiveTest do
   @moduledoc "A scenario on robots of processes, in real time."
   use ExUnit.Case, async: false
-  alias Sim.Scenario
+  alias Sim.{Run, Scenario}
+  alias Sim.Scenario.Runner
   @moduletag :realtime
   @moduletag :capture_log
 
@@ -22,14 +23,20 @@ defmodule Sim.Scenario.LiveTest do
 
     test = self()
 
-    shown = fn at_ms, stages, checks, looks ->
-      send(test, {:look, looks, at_ms, length(stages), length(checks)})
-      looks + 1
+    shown = fn run, looks ->
+      seen = {Run.at_ms(run), length(Run.stages(run)), length(run.checks)}
+      send(test, {:look, looks, seen})
+      {run, looks + 1}
     end
 
-    assert {:ok, result, at_s, verdicts} = Scenario.Live.run(scenario, 1, shown)
-    assert at_s >= 5.0
-    assert_received {:look, 40, at_ms, count, 6}
+    assert {:ok, {result, verdicts}} =
+             Runner.live(scenario, fn run ->
+               {run, _looks} = Runner.play(scenario, run, 1, shown)
+               assert Run.at_ms(run) >= 5_000
+               Runner.verdicts(run)
+             end)
+
+    assert_received {:look, 40, {at_ms, count, 6}}
     assert at_ms >= 4_000 and count >= 3
     stages = for stage <- result.stages, do: {stage.stage, stage.robot}
     assert {:told, :mag69} in stages and {:frozen, :mag69} in stages
@@ -51,7 +58,12 @@ defmodule Sim.Scenario.LiveTest do
         ]
       )
 
-    assert {:ok, %{stages: stages}, _at_s, verdicts} = Scenario.Live.run(scenario)
+    assert {:ok, {%{stages: stages}, verdicts}} =
+             Runner.live(scenario, fn run ->
+               {run, nil} = Runner.play(scenario, run)
+               Runner.verdicts(run)
+             end)
+
     assert Enum.all?(verdicts, & &1.held?), inspect(verdicts)
 
     assert [%{robot: :mag70, command: "wander", why: "mag70 does not answer"}] =
@@ -61,14 +73,14 @@ defmodule Sim.Scenario.LiveTest do
   test "a scenario with an order that only lockstep draws is refused" do
     {:ok, scenario} = Scenario.new(options: [robots: 1, casts: :drawn])
 
-    assert Scenario.Live.run(scenario) ==
+    assert Runner.live(scenario, & &1) ==
              {:error,
               "casts: :drawn is for runs in lockstep; processes hear each other as they are"}
   end
 
   test "what cannot start is one line" do
     {:ok, scenario} = Scenario.new(options: [robots: 1, map: "nowhere.png"])
-    assert {:error, line} = Scenario.Live.run(scenario)
+    assert {:error, line} = Runner.live(scenario, & &1)
     assert line =~ "nowhere.png"
   end
 end

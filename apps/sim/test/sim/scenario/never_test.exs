@@ -6,8 +6,8 @@ defmodule Sim.Scenario.NeverTest do
   use Sim.LockstepCase, async: true
   alias Missions.Landmark.Reference
   alias Sim.Chaos.{Run, Runner, ScenarioFile}
-  alias Sim.{Invariants, Scenario, Trial}
-  alias Sim.Invariants.Violation
+  alias Sim.Check.{Invariants, Violation}
+  alias Sim.{Scenario, Trial}
 
   @robots [:mag1, :mag2, :mag3]
 
@@ -16,7 +16,7 @@ defmodule Sim.Scenario.NeverTest do
     @behaviour Robot.Mission
 
     @impl Robot.Mission
-    def option_table, do: [fault: {:one_of, [:none | Sim.Invariants.names()]}]
+    def option_table, do: [fault: {:one_of, [:none | Sim.Check.Invariants.names()]}]
 
     @impl Robot.Mission
     def roles, do: %{lead: :leads, follow: :follows}
@@ -160,13 +160,9 @@ defmodule Sim.Scenario.NeverTest do
     assert {:ok, read} = scenario |> Scenario.File.text() |> Scenario.File.parse()
     assert read == scenario
     {:ok, trial} = Trial.new(Scenario.trial(read))
-    run = read |> Scenario.Runner.begin(spoil.(trial)) |> to_the_end()
-    [verdict] = Scenario.Runner.verdicts(run)
+    {run, nil} = Scenario.Runner.play(read, Scenario.Runner.begin(read, spoil.(trial)))
+    {_result, [verdict]} = Scenario.Runner.verdicts(run)
     if verdict.held?, do: nil, else: verdict.figures
-  end
-
-  defp to_the_end(run) do
-    if Scenario.Runner.done?(run), do: run, else: run |> Scenario.Runner.step() |> to_the_end()
   end
 
   for invariant <- Invariants.names() do

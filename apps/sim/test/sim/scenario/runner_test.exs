@@ -1,7 +1,7 @@
 defmodule Sim.Scenario.RunnerTest do
   use Sim.LockstepCase, async: true
-  alias Sim.{Scenario, Trial, World}
-  alias Sim.Scenario.{Runner, View}
+  alias Sim.{Moment, Scenario, Trial, World}
+  alias Sim.Scenario.Runner
 
   defp run(options, script, expect) do
     {:ok, scenario} =
@@ -159,8 +159,8 @@ defmodule Sim.Scenario.RunnerTest do
 
     parts = fn script, at_s ->
       stepped([robots: robots], script, at_s)
-      |> View.of()
-      |> View.leaders()
+      |> Moment.of()
+      |> Moment.leaders()
       |> Enum.map(&elem(&1, 0))
     end
 

@@ -3,7 +3,7 @@ defmodule Sim.Trial.PartitionTest do
   use Sim.LockstepCase, async: true
   import Sim.TrialRuns
   alias Sim.Trial
-  alias Sim.Trial.{AgreementMetrics, Cuts}
+  alias Sim.Trial.{AgreementMetrics, Cuts, RunLog}
   @moduletag :slow
 
   @left [:mag1, :min2, :mag3]
@@ -112,7 +112,8 @@ defmodule Sim.Trial.PartitionTest do
       ]
       |> Enum.with_index()
       |> Enum.reduce(%AgreementMetrics{}, fn {{leaders, parts}, n}, agreement ->
-        AgreementMetrics.note(agreement, n * 100, lead.(leaders), parts, [])
+        claims = lead.(leaders)
+        AgreementMetrics.note(agreement, n * 100, claims, RunLog.leaders(claims, parts), [])
       end)
 
     assert AgreementMetrics.report(agreement).rivals_max_s == 0.2

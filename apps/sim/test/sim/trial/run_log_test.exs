@@ -3,6 +3,8 @@ defmodule Sim.Trial.RunLogTest do
   alias Sim.Scene
   alias Sim.Trial.RunLog
 
+  doctest RunLog
+
   # A fleet of which a leader claims to be formed, and withdraws it, for so many seconds.
   defp flickering(run_log, seconds) do
     Enum.reduce(1..(seconds * 10), run_log, fn tick, run_log ->

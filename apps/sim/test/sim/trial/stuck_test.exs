@@ -110,7 +110,7 @@ defmodule Sim.Trial.StuckTest do
   # A wall stands where the line should be; one robot used to stand 2.4 m off for two minutes in
   # `follow`. With seed 2 a robot takes another one for its leader, and is 0.3 m off; a robot that
   # sees it where it should not be is no longer sure of its own place, so that nobody claims. With seed 10 the last robot
-  # of the line is 0.71 m off, and sure that it is not: one of 17 claims with seeds 1 to 14, which docs/results.md tells.
+  # of the line is 0.71 m off, and sure that it is not: one of 17 claims with seeds 1 to 14, which docs/reports/landmark.md tells.
   @false_claims [10]
   for {seeds, least, tags} <- [{[10], 1, []}, {[2, 10, 11], 2, [long: true]}] do
     @tag tags

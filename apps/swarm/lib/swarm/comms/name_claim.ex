@@ -47,7 +47,7 @@ defmodule Swarm.Comms.NameClaim do
 
       :give_way ->
         told = {:event, [:swarm, :comms, :duplicate_id], %{other: node}}
-        effects = present(name.robot, false) ++ [{:cast, :pilot, {:halt, nil}}, told]
+        effects = present(name.robot, false) ++ [{:cast, :pilot, {:halt, nil, nil}}, told]
         {%{name | left?: true, rival_ms: now_ms}, effects}
 
       :stay when not name.left? and comms != nil ->

@@ -13,8 +13,8 @@ defmodule Swarm.Replacement.Job do
   | `:returning` | all have ended it, 3 s at most | code and missions are as before, and robots go on |
 
   What goes wrong up to the end of `:watching` leads back for all robots of the node, because they share its code. A robot
-  that a person stops meanwhile stays where it is, and nothing starts it again; nor does anything start one that was on no
-  mission, and went back.
+  that a person stops meanwhile stays where it is, and nothing starts it again. A robot that had no mission stays idle after
+  a rollback.
 
   | effect | |
   |---|---|

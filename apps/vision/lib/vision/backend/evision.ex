@@ -7,7 +7,7 @@ if Code.ensure_loaded?(Evision) do
     first class is first split by the others into those of one mask each. That takes more calls, but
     only for classes that do overlap.
 
-    It is for those who build a pipeline of OpenCV anyway, and want this answer beside it: as a mere
+    It is for programs that build a pipeline of OpenCV anyway, and want this answer beside it: as a mere
     blob finder it is far slower than `Vision.Backend.Native` (docs/packages.md).
     """
     @behaviour Vision.Backend

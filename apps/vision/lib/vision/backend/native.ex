@@ -17,7 +17,7 @@ defmodule Vision.Backend.Native do
       each column of the widest one; most frames need less than 100 kB;
     * after 64 frames in a row that needed less than a quarter of its room for regions, it keeps
       twice what they needed;
-    * garbage collection frees it when nobody refers to it any more;
+    * garbage collection frees it when nothing refers to it any more;
     * it is locked while a frame is searched. A second process that comes meanwhile with the same
       one takes memory of its own for that call; so does everybody after a process was killed while
       its frame waited for a dirty scheduler, because the lock then stays;

@@ -10,7 +10,7 @@ if Code.ensure_loaded?(Nx) do
 
         config :nx, default_defn_options: [compiler: EXLA]
 
-    It is for those who go on with tensors of their own: `masks/3` is the first step of a detector
+    It is for programs that go on with tensors of their own: `masks/3` is the first step of a detector
     in Nx. As a mere blob finder it is far slower than `Vision.Backend.Native` (docs/packages.md).
     """
     @behaviour Vision.Backend

@@ -73,7 +73,7 @@ defmodule Vision.View.Subscribers do
   @spec size(t()) :: non_neg_integer()
   def size(%__MODULE__{viewers: viewers}), do: map_size(viewers)
 
-  @doc "In how many milliseconds a picture is due; `:never` while nobody waits for one."
+  @doc "In how many milliseconds a picture is due; `:never` while none waits for one."
   @spec due(t(), now_ms :: integer()) :: non_neg_integer() | :never
   def due(%__MODULE__{viewers: viewers}, now_ms) do
     case for {_id, %{waits?: true, next_ms: next_ms}} <- viewers, do: next_ms do

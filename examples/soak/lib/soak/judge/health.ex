@@ -4,7 +4,7 @@ defmodule Soak.Judge.Health do
   devices are online, and it is well in the words of systemd's watchdog; and so long after the last one of any
   robot all hear and list all, nobody is held by a stop that was released, and all are one group. Pure; times in microseconds.
 
-  The bounds are sums of what docs/architecture.md and rel/convoy.service allow: 2 s until a node is started
+  The bounds are sums of what docs/times.md and rel/convoy.service allow: 2 s until a node is started
   again, its start on a busy machine, back-off of devices and connections up to 5 s each.
   """
 

@@ -3,7 +3,7 @@ defmodule Soak.Judge.Leaders do
   Judges leaders: of two robots that reach each other, at most one leads; and never two in the same epoch. Pure;
   times in microseconds.
 
-  What is allowed comes from the table of times of docs/architecture.md: who has come to reach whom may not
+  What is allowed comes from docs/times.md: who has come to reach whom may not
   know it for 2 s, and a leader that should step down does so within the lease of 1.5 s. Parts that were cut off from each
   other count their epochs by themselves, so two epochs are compared only where both leaderships began
   among robots that knew each other.

@@ -4,7 +4,7 @@ defmodule Soak.Judge.Stops do
   times in microseconds.
 
   Robots that were undisturbed since the order have 1 s; those that have come to be reachable since have 6 s: a
-  node that has just started is believed only after it was heard anew (docs/architecture.md).
+  node that has just started is believed only after it was heard anew (docs/times.md).
   """
   alias Soak.Links
 

@@ -105,7 +105,7 @@ defmodule Missions.Landmark.Follower.Progress do
 
   # Farther away, or if the slot trembles, only time shows that a robot makes no progress.
   defp late(progress, %{now_ms: now} = mission, slot, error) do
-    late = patience(progress.late, slot, error, now)
+    late = patience(progress.late, mission.percept.pose, slot, error, now)
     gain = gain(mission.percept)
     stale? = fn {_place, patience} -> Patience.stale?(patience, gain, @late_ms) end
     {_frame, _pose, since_ms} = stopped = stopped(progress.stopped, mission.percept.odometry, now)
@@ -126,11 +126,13 @@ defmodule Missions.Landmark.Follower.Progress do
 
   defp stopped(_none, odometry, now), do: {odometry.frame, odometry.pose, now}
 
-  defp patience(late, slot, error, now) do
+  # A slot that swings past a robot brings neither nearer: the robot comes nearer to where the slot was, too.
+  defp patience(late, pose, slot, error, now) do
     late =
-      for {place, patience} <- late,
-          Pose.distance(place, slot) <= @elsewhere,
-          do: {place, Patience.note(patience, error, now, :straight)}
+      for {place, patience} <- late, Pose.distance(place, slot) <= @elsewhere do
+        left = max(error, Pose.distance(pose, place))
+        {place, Patience.note(patience, left, now, :straight)}
+      end
 
     if Enum.any?(late, fn {place, _} -> Pose.distance(place, slot) <= @here end),
       do: late,

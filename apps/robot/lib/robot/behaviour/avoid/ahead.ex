@@ -1,12 +1,12 @@
 defmodule Robot.Behaviour.Avoid.Ahead do
-  @moduledoc "Tells who is on a robot's way, and does not drive along it as it does itself. Pure; metres, map frame."
+  @moduledoc "Finds robots on the path that do not travel along it. Pure; metres, map frame."
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Percept
 
   # Bodies so near to a way (metres) are on it.
   @beside 0.1
-  # Who drives along it has at least this share of its speed in its direction, or in the opposite one.
+  # A robot that travels along the path has at least this share of its speed in the path's direction, or against it.
   @along 0.3
 
   @doc """

@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Avoid.Brake do
   @moduledoc false
-  # Checks the speed that avoidance has found, before caution, arbiter and gate (docs/architecture.md, section 3): if the robot drove on
+  # Checks the speed that avoidance has found, before caution, arbiter and gate (docs/architecture.md, section 1): if the robot drove on
   # for a moment and then braked, would it come too near to another robot that does the same? If so, it drives more slowly, or not at all. The turn rate is not limited. Pure.
   #
   # The wheels cannot follow a wished velocity immediately, so the real path differs from the

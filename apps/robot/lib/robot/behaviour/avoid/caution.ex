@@ -13,7 +13,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
   alias Robot.Navigation.Orca
 
   # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
-  # looking (`Sim.GateAloneTest`; docs/results.md, section 6). A base may have few sonars behind.
+  # looking (`Sim.GateAloneTest`; docs/reports/avoidance.md). A base may have few sonars behind.
   @speed 0.2
   @backwards 0.1
   # A robot whose place is not known better than this (metres, 95 of 100 cases) may meet others beside where they tell

@@ -183,7 +183,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   defp metres({metres, _place}), do: metres
   defp metres(nil), do: nil
 
-  # Before whom it has been for a while.
+  # Remembers whom it has been facing, and since when.
   defp face(right, there, %{at_ms: at_ms}) do
     case {Enum.find(there, &(&1.gap < @facing and slow?(&1))), right.facing} do
       {nil, _before} -> %{right | facing: nil}

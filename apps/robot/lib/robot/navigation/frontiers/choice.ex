@@ -10,7 +10,7 @@ defmodule Robot.Navigation.Frontiers.Choice do
   alias Hal.Pose
   alias Robot.Navigation.Frontiers
 
-  # Who goes to a place will see what is within so many metres of it; going there, too, is like a way longer by so many.
+  # A place within `@sees` m of another robot's target costs `@extra` m more.
   @sees 5.0
   @extra 12.0
   # A robot keeps going where it goes unless another place costs so many metres less.

@@ -1,4 +1,4 @@
-defmodule Sim.Invariants.Leaders do
+defmodule Sim.Check.Leaders do
   @moduledoc """
   Judges who leads, for each part of the radio (`Sim.Radio.parts/2`: robots that can reach each
   other, if necessary by way of others). Pure; fed every 100 ms.
@@ -11,7 +11,7 @@ defmodule Sim.Invariants.Leaders do
   | `not_together` | in a part with a leader, all follow it, in its epoch |
   | `no_leader` | a part of which somebody has seen the landmark in the last 10 s has a leader |
 
-  How long each may take follows from the table of times in docs/architecture.md. The clock of a part
+  How long each may take follows from docs/times.md. The clock of a part
   starts again when a robot joins or leaves it.
 
   | | without loss | why |
@@ -27,7 +27,10 @@ defmodule Sim.Invariants.Leaders do
   Robots that are not asked: one alone that has lost everybody (it stands, `lost_link`), one whose
   mission is ended by a stop, and a minority where a majority is needed.
   """
-  alias Sim.Invariants.Violation
+  @behaviour Sim.Check.Kind
+  alias Sim.Check.Violation
+  alias Sim.Moment
+  alias Sim.Trial.RunLog
 
   @known_ms 2_000
   @two_ms 1_800
@@ -50,8 +53,7 @@ defmodule Sim.Invariants.Leaders do
           seen: %{atom() => integer()}
         }
 
-  @doc "The judge of a run with these options (`Sim.Trial.Options`)."
-  @spec new(map()) :: t()
+  @impl Sim.Check.Kind
   def new(%{robots: robots, loss: loss} = options) do
     %__MODULE__{
       robots: length(robots),
@@ -71,34 +73,33 @@ defmodule Sim.Invariants.Leaders do
   @doc """
   By how much longer agreement may take if this share of the messages is lost.
 
-      iex> Sim.Invariants.Leaders.factor(0.5)
+      iex> Sim.Check.Leaders.factor(0.5)
       4.0
   """
   @spec factor(number()) :: float()
   def factor(loss), do: 1 / max((1 - loss) * (1 - loss), 0.01)
 
-  @doc """
-  One tick: what the robots that can act claim of the run's mission, with each one's `role` and `sight`
-  (`t:Robot.Mission.role/0`, `t:Robot.Mission.account/0`), and the parts that they are in.
-  """
-  @spec note(t(), integer(), [{atom(), map()}], [[atom()]]) :: {[Violation.t()], t()}
-  def note(judge, at_ms, claims, parts) do
-    claims = Map.new(claims)
+  @impl Sim.Check.Kind
+  def note(_asked, %{at_ms: at_ms} = moment, judge) do
+    said = Moment.said(moment)
+    claims = Map.new(said)
 
     judge = %{
       judge
       | leading: leading(judge.leading, claims, at_ms),
-        seen: seen(judge, claims, at_ms)
+        seen: seen(judge, claims, moment)
     }
 
     {wrong, parts} =
-      Enum.reduce(parts, {majorities(judge, at_ms), %{}}, fn part, {wrong, parts} ->
+      said
+      |> RunLog.leaders(moment.parts)
+      |> Enum.reduce({majorities(judge, at_ms), %{}}, fn {part, leaders}, {wrong, parts} ->
         clocks = Map.get(judge.parts, part, %{since: at_ms})
-        {more, clocks} = judge(judge, part, clocks, claims, at_ms)
+        {more, clocks} = judge(judge, part, leaders, clocks, claims, at_ms)
         {wrong ++ more, Map.put(parts, part, clocks)}
       end)
 
-    {wrong, %{judge | parts: parts}}
+    {:never, wrong, %{judge | parts: parts}}
   end
 
   defp leading(leading, claims, at_ms) do
@@ -110,8 +111,11 @@ defmodule Sim.Invariants.Leaders do
     end
   end
 
-  defp seen(judge, claims, at_ms) do
-    for {id, %{sight: sight}} when sight != nil <- claims, into: judge.seen, do: {id, at_ms}
+  defp seen(judge, claims, %{at_ms: at_ms, run_log: log}) do
+    for {id, %{role: _of_this_mission} = claim} <- claims,
+        RunLog.account(log, claim).sight != nil,
+        into: judge.seen,
+        do: {id, at_ms}
   end
 
   defp majorities(%{majority: nil}, _at_ms), do: []
@@ -123,9 +127,8 @@ defmodule Sim.Invariants.Leaders do
 
   defp majorities(_judge, _at_ms), do: []
 
-  defp judge(judge, part, clocks, claims, at_ms) do
+  defp judge(judge, part, leaders, clocks, claims, at_ms) do
     active = for id <- part, takes_part?(claims[id]), do: id
-    leaders = for id <- active, is_map_key(judge.leading, id), do: id
 
     clocks =
       clocks

@@ -1,12 +1,12 @@
-defmodule Sim.Invariants.Stops do
+defmodule Sim.Check.Stops do
   @moduledoc false
   # Judges how an emergency stop spreads. Pure; fed every 100 ms.
   #
   # `stop_lost`: a stop that holds one robot of a part of the radio holds all of that part, but those
   # that a person has reset since. Heartbeats carry it at 5 Hz, so it is given 2 s, the time after which
-  # a robot from which nothing comes is gone (docs/architecture.md), divided by (1 - loss)^2.
-  alias Sim.Invariants.Leaders
-  alias Sim.Invariants.Violation
+  # a robot from which nothing comes is gone (docs/times.md), divided by (1 - loss)^2.
+  @behaviour Sim.Check.Kind
+  alias Sim.Check.{Leaders, Violation}
   alias Swarm.EStop
 
   @spread_ms 2_000
@@ -19,16 +19,16 @@ defmodule Sim.Invariants.Stops do
           missing: %{{[atom()], atom(), EStop.State.tag()} => integer()}
         }
 
-  @doc "The judge of a run with these options."
-  @spec new(map()) :: t()
+  @impl Sim.Check.Kind
   def new(%{loss: loss} = options) do
     factor = loss |> Leaders.worst(options) |> Leaders.factor()
     %__MODULE__{limit_ms: round(@spread_ms * factor)}
   end
 
-  @doc "One tick: what is known of stops by the robots that can act, and the parts that they are in."
-  @spec note(t(), integer(), %{atom() => EStop.State.t()}, [[atom()]]) :: {[Violation.t()], t()}
-  def note(judge, at_ms, stops, parts) do
+  @impl Sim.Check.Kind
+  def note(_asked, %{stops: nil}, _judge), do: :unseen
+
+  def note(_asked, %{at_ms: at_ms, stops: stops, parts: parts}, judge) do
     missing =
       for part <- parts,
           tag <- Enum.uniq(for id <- part, stop = stops[id], tag <- stop.held, do: tag),
@@ -46,6 +46,6 @@ defmodule Sim.Invariants.Stops do
         Violation.new(:stop_lost, at_ms, [id], figures)
       end
 
-    {wrong, %{judge | missing: missing}}
+    {:never, wrong, %{judge | missing: missing}}
   end
 end

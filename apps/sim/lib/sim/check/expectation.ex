@@ -1,6 +1,6 @@
-defmodule Sim.Scenario.Expectation do
+defmodule Sim.Check.Expectation do
   @moduledoc """
-  Describes what a scenario may expect of its run, as data. Pure; `Sim.Scenario.Check` judges it. Seconds
+  Describes what a scenario may expect of its run, as data. Pure; `Sim.Check` judges it. Seconds
   count from the start of the run, all that is measured is true, as nobody in the run knows it.
 
   | expectation | holds if |
@@ -26,12 +26,13 @@ defmodule Sim.Scenario.Expectation do
   | `{:sees_distance, robot, within_percent: p}` | its measure of the distance to the landmark is never further off, and it has one |
   | `{:speed_at_most, m_s}` | no robot is ever faster |
   | `{:separation_at_least, m}` | no two robots come closer, edge to edge |
-  | `{:never, invariant}` | this invariant is never violated (`Sim.Invariants`), judged as in `mix chaos` |
+  | `{:never, invariant}` | this invariant is never violated (`Sim.Check.Invariants`), judged as in `mix chaos` |
 
   `who` is a robot or `:all`. Those with `by_s` also take `after_s` (0): what was before does not
   count. Those about the whole run take `from_s` (0) and `to_s` (its end).
   """
   alias Hal.Options.Type
+  alias Sim.Check.{Bodies, Fleet, Invariants}
   alias Sim.Trial.Form
 
   @type t :: tuple()
@@ -58,17 +59,17 @@ defmodule Sim.Scenario.Expectation do
   @doc """
   An expectation with its numbers as floats, or what is wrong with it.
 
-      iex> Sim.Scenario.Expectation.read({:still, :mag1, from_s: 3, to_s: 9})
+      iex> Sim.Check.Expectation.read({:still, :mag1, from_s: 3, to_s: 9})
       {:ok, {:still, :mag1, [from_s: 3.0, to_s: 9.0]}}
-      iex> Sim.Scenario.Expectation.read({:still, :mag1, from_s: 3})
+      iex> Sim.Check.Expectation.read({:still, :mag1, from_s: 3})
       {:error, [{["to_s"], "is missing: expected a number from 0 to 1000000 s"}]}
-      iex> Sim.Scenario.Expectation.read({:phase, :all, :leed, by_s: 9}) |> elem(1) |> hd() |> elem(1) |> String.split("; ") |> List.last()
+      iex> Sim.Check.Expectation.read({:phase, :all, :leed, by_s: 9}) |> elem(1) |> hd() |> elem(1) |> String.split("; ") |> List.last()
       "did you mean :lead?"
   """
   @spec read(term()) :: Type.result()
   def read(term) do
-    with {:ok, expectation} <- Form.read(term, forms(), "an expectation"),
-         do: ordered(expectation)
+    forms = for {_kind, form} <- table(), do: form
+    with {:ok, expectation} <- Form.read(term, forms, "an expectation"), do: ordered(expectation)
   end
 
   # A window that ends before it begins would hold always, or never.
@@ -80,8 +81,8 @@ defmodule Sim.Scenario.Expectation do
       else: {:error, [{[], "expected an end after the beginning, got #{inspect(expectation)}"}]}
   end
 
-  # All expectations, as forms of `Sim.Trial.Form`.
-  defp forms do
+  # All expectations, as forms of `Sim.Trial.Form`, with the module that judges them (`Sim.Check.Kind`).
+  defp table do
     robot = {:check, &(is_atom(&1) and &1 not in [nil, true, false, :all]), "a robot of this run"}
 
     who =
@@ -98,35 +99,50 @@ defmodule Sim.Scenario.Expectation do
     degrees = {:number, 0, 36_000, "degrees"}
 
     [
-      {:formed, [], by},
-      {:formed_again, [], within},
-      {:not_formed, [], always},
-      {:leader, [], by},
-      {:leader_changed, [], within},
-      {:same_leader, [], [from_s: required(seconds()), to_s: seconds()]},
-      {:one_leader, [], [after_s: required(seconds()), to_s: seconds()]},
-      {:at_most_one_leader, [], [grace_s: required(seconds())]},
-      {:agreed, [], by},
-      {:rest, [], by},
-      {:phase, [robot: who, phase: phase], by},
-      {:never_phase, [robot: who, phase: phase], always},
-      {:says, [robot: who, word: {:one_of, [:in_place, :unsure, :blocked]}], by},
-      {:at, [robot: robot, place: place], [{:within_m, size} | by]},
-      {:in_slot, [robot: who], [{:within_m, size} | by]},
-      {:still, [robot: who], span},
-      {:moves, [robot: who], by},
-      {:turned, [robot: robot, degrees: {:number, -36_000, 36_000, "degrees"}],
-       [{:within_deg, required(degrees)} | by]},
-      {:sees_distance, [robot: robot],
-       [{:within_percent, required({:number, 0, 1000, "percent"})} | always]},
-      {:speed_at_most, [m_s: {:number, 0, 100, "m/s"}], always},
-      {:separation_at_least, [metres: {:number, 0, 1000, "m"}], []},
-      {:never, [invariant: {:one_of, Sim.Invariants.names()}], []}
+      {Fleet, {:formed, [], by}},
+      {Fleet, {:formed_again, [], within}},
+      {Fleet, {:not_formed, [], always}},
+      {Fleet, {:leader, [], by}},
+      {Fleet, {:leader_changed, [], within}},
+      {Fleet, {:same_leader, [], [from_s: required(seconds()), to_s: seconds()]}},
+      {Fleet, {:one_leader, [], [after_s: required(seconds()), to_s: seconds()]}},
+      {Fleet, {:at_most_one_leader, [], [grace_s: required(seconds())]}},
+      {Fleet, {:agreed, [], by}},
+      {Fleet, {:rest, [], by}},
+      {Fleet, {:phase, [robot: who, phase: phase], by}},
+      {Fleet, {:never_phase, [robot: who, phase: phase], always}},
+      {Fleet, {:says, [robot: who, word: {:one_of, [:in_place, :unsure, :blocked]}], by}},
+      {Bodies, {:at, [robot: robot, place: place], [{:within_m, size} | by]}},
+      {Bodies, {:in_slot, [robot: who], [{:within_m, size} | by]}},
+      {Bodies, {:still, [robot: who], span}},
+      {Bodies, {:moves, [robot: who], by}},
+      {Bodies,
+       {:turned, [robot: robot, degrees: {:number, -36_000, 36_000, "degrees"}],
+        [{:within_deg, required(degrees)} | by]}},
+      {Bodies,
+       {:sees_distance, [robot: robot],
+        [{:within_percent, required({:number, 0, 1000, "percent"})} | always]}},
+      {Bodies, {:speed_at_most, [m_s: {:number, 0, 100, "m/s"}], always}},
+      {Bodies, {:separation_at_least, [metres: {:number, 0, 1000, "m"}], []}},
+      {Invariants, {:never, [invariant: {:one_of, Invariants.names()}], []}}
     ]
   end
 
   defp seconds, do: {:number, 0, 1_000_000, "s"}
   defp required(type), do: [type, required: true]
+
+  @doc "The module that judges an expectation (`Sim.Check.Kind`), and what it is asked: with options, also if none are given."
+  @spec asked(t()) :: {module(), t()}
+  def asked({:never, invariant} = never), do: {Invariants.kind(invariant), never}
+
+  def asked(expectation) do
+    {kind, {_name, values, keys}} = row(expectation)
+    whole? = keys == [] or tuple_size(expectation) > length(values) + 1
+    {kind, if(whole?, do: expectation, else: Tuple.append(expectation, []))}
+  end
+
+  defp row(expectation),
+    do: Enum.find(table(), fn {_kind, form} -> elem(form, 0) == elem(expectation, 0) end)
 
   @doc "The phases that a robot may be in, with any mission that has a name (`c:Robot.Mission.phases/0`)."
   @spec phases() :: [atom()]
@@ -135,9 +151,9 @@ defmodule Sim.Scenario.Expectation do
   @doc """
   The options of an expectation.
 
-      iex> Sim.Scenario.Expectation.options({:formed, [by_s: 60.0]})
+      iex> Sim.Check.Expectation.options({:formed, [by_s: 60.0]})
       [by_s: 60.0]
-      iex> Sim.Scenario.Expectation.options({:never, :collision})
+      iex> Sim.Check.Expectation.options({:never, :collision})
       []
   """
   @spec options(t()) :: keyword()
@@ -151,16 +167,16 @@ defmodule Sim.Scenario.Expectation do
   @doc "The robots that it names."
   @spec robots(t()) :: [atom()]
   def robots(expectation) do
-    {_name, types, _keys} = List.keyfind(forms(), elem(expectation, 0), 0)
+    {_kind, {_name, types, _keys}} = row(expectation)
     for {{:robot, _type}, n} <- Enum.with_index(types, 1), do: elem(expectation, n)
   end
 
   @doc """
   The seconds between which it is judged; the second is `:end` for the end of the run.
 
-      iex> Sim.Scenario.Expectation.window({:formed_again, [after_s: 40.0, within_s: 30.0]})
+      iex> Sim.Check.Expectation.window({:formed_again, [after_s: 40.0, within_s: 30.0]})
       {40.0, 70.0}
-      iex> Sim.Scenario.Expectation.window({:never, :collision})
+      iex> Sim.Check.Expectation.window({:never, :collision})
       {0, :end}
   """
   @spec window(t()) :: {from_s :: number(), to_s :: number() | :end}

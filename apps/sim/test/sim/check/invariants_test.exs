@@ -1,17 +1,17 @@
-defmodule Sim.InvariantsTest do
+defmodule Sim.Check.InvariantsTest do
   @moduledoc "Each invariant is violated by what a test constructs, and not by what is next to it."
   use Sim.LockstepCase, async: true
   alias Hal.{Pose, Profile, Twist}
   alias Sim.Chaos.Run
-  alias Sim.Invariants
-  alias Sim.Invariants.{Leaders, Limits, Slots, Stops, Violation}
-  alias Sim.{Trial, World}
+  alias Sim.Check.{Invariants, Leaders, Limits, Slots, Stops, Violation}
+  alias Sim.{Moment, Trial, World}
+  alias Sim.Trial.{Faults, RunLog}
   alias Swarm.EStop
   alias Missions.Landmark.Reference
 
-  doctest Sim.Invariants.Attempt
-  doctest Sim.Invariants.Violation
-  doctest Sim.Invariants.Leaders
+  doctest Sim.Run
+  doctest Sim.Check.Violation
+  doctest Sim.Check.Leaders
 
   @three [:mag1, :mag2, :mag3]
 
@@ -19,17 +19,33 @@ defmodule Sim.InvariantsTest do
     Map.merge(%{robots: @three, loss: 0.0, policy: :available, of: nil, delay_ms: {5, 50}}, more)
   end
 
-  defp lead(id, epoch), do: claim(id, :lead, :leads, id, epoch)
-  defp follow(id, leader, epoch), do: claim(id, :follow, :follows, leader, epoch)
-  defp agree(id, sight), do: claim(id, :agree, nil, nil, 0, sight)
+  defp lead(id, epoch), do: claim(id, :lead, id, epoch)
+  defp follow(id, leader, epoch), do: claim(id, :follow, leader, epoch)
+  defp agree(id, sight), do: claim(id, :agree, nil, 0, sight)
 
-  defp claim(id, phase, role, leader, epoch, sight \\ nil),
-    do: {id, %{phase: phase, role: role, leader: leader, epoch: epoch, sight: sight}}
+  defp claim(id, phase, leader, epoch, sight \\ nil),
+    do: {id, %{phase: phase, leader: leader, epoch: epoch, sight: sight}}
+
+  # A moment of which this is known.
+  defp moment(known) do
+    log = RunLog.new(Missions.Landmark)
+    start = %{at_ms: 0, options: options(), world: nil, run_log: log, faults: %Faults{}}
+    claims = known[:claims] || []
+
+    doing = for {id, claim} <- claims, into: %{}, do: {id, {Missions.Landmark, claim[:phase]}}
+
+    start |> Moment.start() |> Map.put(:doing, doing) |> struct!(known)
+  end
+
+  defp note(module, judge, at_ms, moment) do
+    {:never, found, judge} = module.note({:never, :any}, %{moment | at_ms: at_ms}, judge)
+    {found, judge}
+  end
 
   # What a judge finds first in so many ticks of the same; `nil` if nothing.
-  defp first(module, judge, ticks, arguments, from_ms \\ 0) do
+  defp first(module, judge, ticks, known, from_ms \\ 0) do
     Enum.reduce_while(1..ticks, {nil, judge}, fn k, {nil, judge} ->
-      case apply(module, :note, [judge, from_ms + 100 * k | arguments]) do
+      case note(module, judge, from_ms + 100 * k, moment(known)) do
         {[], judge} -> {:cont, {nil, judge}}
         {[violation | _], judge} -> {:halt, {violation, judge}}
       end
@@ -40,15 +56,19 @@ defmodule Sim.InvariantsTest do
     test "two of one part for longer than the lease, once they know each other" do
       claims = [lead(:mag1, 1), lead(:mag2, 2), follow(:mag3, :mag1, 1)]
       judge = Leaders.new(options())
-      assert {nil, _judge} = first(Leaders, judge, 37, [claims, [@three]])
+      assert {nil, _judge} = first(Leaders, judge, 37, claims: claims, parts: [@three])
 
       assert {%Violation{invariant: :two_leaders, at_ms: 4_000, robots: [:mag1, :mag2]}, _judge} =
-               first(Leaders, judge, 100, [claims, [@three]])
+               first(Leaders, judge, 100, claims: claims, parts: [@three])
 
-      assert {nil, _judge} = first(Leaders, judge, 300, [claims, [[:mag1, :mag3], [:mag2]]])
+      assert {nil, _judge} =
+               first(Leaders, judge, 300, claims: claims, parts: [[:mag1, :mag3], [:mag2]])
 
       assert {%Violation{at_ms: 15_400}, _judge} =
-               first(Leaders, Leaders.new(options(%{loss: 0.5})), 300, [claims, [@three]])
+               first(Leaders, Leaders.new(options(%{loss: 0.5})), 300,
+                 claims: claims,
+                 parts: [@three]
+               )
     end
 
     test "two of one epoch at once, but not just after their parts have met" do
@@ -56,13 +76,13 @@ defmodule Sim.InvariantsTest do
       judge = Leaders.new(options())
 
       assert {%Violation{invariant: :two_leaders}, _judge} =
-               first(Leaders, judge, 100, [claims, [@three]])
+               first(Leaders, judge, 100, claims: claims, parts: [@three])
 
       calm = [lead(:mag1, 3), follow(:mag2, :mag1, 3), follow(:mag3, :mag1, 3)]
-      {nil, judge} = first(Leaders, judge, 30, [calm, [@three]])
+      {nil, judge} = first(Leaders, judge, 30, claims: calm, parts: [@three])
 
       assert {%Violation{invariant: :same_epoch, at_ms: 3_100, figures: "both lead in epoch 4"},
-              _} = first(Leaders, judge, 1, [claims, [@three]], 3_000)
+              _} = first(Leaders, judge, 1, [claims: claims, parts: [@three]], 3_000)
     end
 
     test "two majorities at any time, wherever they are" do
@@ -70,21 +90,21 @@ defmodule Sim.InvariantsTest do
       claims = [lead(:mag1, 1), lead(:mag2, 2)]
 
       assert {%Violation{invariant: :two_majorities, at_ms: 100}, _judge} =
-               first(Leaders, judge, 1, [claims, [[:mag1], [:mag2]]])
+               first(Leaders, judge, 1, claims: claims, parts: [[:mag1], [:mag2]])
     end
 
     test "a robot that follows somebody else than its part does" do
       claims = [lead(:mag1, 2), follow(:mag2, :mag1, 2), follow(:mag3, :min9, 1)]
       judge = Leaders.new(options())
-      assert {nil, _judge} = first(Leaders, judge, 100, [claims, [@three]])
+      assert {nil, _judge} = first(Leaders, judge, 100, claims: claims, parts: [@three])
 
       assert {%Violation{invariant: :not_together, at_ms: 10_200, figures: figures}, _judge} =
-               first(Leaders, judge, 200, [claims, [@three]])
+               first(Leaders, judge, 200, claims: claims, parts: [@three])
 
       assert figures =~ "mag3 follow of min9 in 1"
       # One whose mission was stopped is not asked.
       stopped = [lead(:mag1, 2), follow(:mag2, :mag1, 2), {:mag3, %{}}]
-      assert {nil, _judge} = first(Leaders, judge, 200, [stopped, [@three]])
+      assert {nil, _judge} = first(Leaders, judge, 200, claims: stopped, parts: [@three])
     end
 
     test "nobody leads, although somebody sees the landmark" do
@@ -92,15 +112,17 @@ defmodule Sim.InvariantsTest do
       judge = Leaders.new(options())
 
       assert {%Violation{invariant: :no_leader, at_ms: 45_200}, _judge} =
-               first(Leaders, judge, 600, [seen, [@three]])
+               first(Leaders, judge, 600, claims: seen, parts: [@three])
 
       unseen = for id <- @three, do: agree(id, nil)
-      assert {nil, _judge} = first(Leaders, judge, 600, [unseen, [@three]])
+      assert {nil, _judge} = first(Leaders, judge, 600, claims: unseen, parts: [@three])
       # Too few, where a majority is needed; and alone.
       judge = Leaders.new(options(%{policy: :majority, of: 6}))
-      assert {nil, _judge} = first(Leaders, judge, 600, [seen, [@three]])
+      assert {nil, _judge} = first(Leaders, judge, 600, claims: seen, parts: [@three])
       judge = Leaders.new(options())
-      assert {nil, _judge} = first(Leaders, judge, 600, [seen, [[:mag1], [:mag2], [:mag3]]])
+
+      assert {nil, _judge} =
+               first(Leaders, judge, 600, claims: seen, parts: [[:mag1], [:mag2], [:mag3]])
     end
   end
 
@@ -139,7 +161,8 @@ defmodule Sim.InvariantsTest do
 
       {found, _judge} =
         Enum.flat_map_reduce(1..30, judge, fn k, judge ->
-          Slots.note(judge, 100 * k, places(tick.(100 * k), 100 * k))
+          places = places(tick.(100 * k), 100 * k)
+          note(Slots, judge, 100 * k, moment(places: places))
         end)
 
       assert [%Violation{invariant: :same_slot, robots: [:mag2, :mag3], at_ms: 1_600} | _] = found
@@ -147,7 +170,8 @@ defmodule Sim.InvariantsTest do
       # Each in an epoch of its own, or with an anchor that is too old.
       for {mine, at_ms} <- [{anchor(epoch: 2), 9_900}, {anchor([]), 8_000}] do
         missions = [follower(:mag2, mine, at_ms), follower(:mag3, other, 9_900)]
-        assert {[], %{same: same}} = Slots.note(judge, 10_000, places(missions, 10_000))
+        known = moment(places: places(missions, 10_000))
+        assert {[], %{same: same}} = note(Slots, judge, 10_000, known)
         assert same == %{}
       end
     end
@@ -156,10 +180,11 @@ defmodule Sim.InvariantsTest do
       leader = {:mag1, %{phase: :lead, anchor: anchor(places: [1, 1])}}
 
       assert {[%Violation{invariant: :bad_anchor, robots: [:mag1]}], _judge} =
-               Slots.note(Slots.new(options()), 100, places([leader], 100))
+               note(Slots, Slots.new(options()), 100, moment(places: places([leader], 100)))
 
       right = {:mag1, %{phase: :lead, anchor: anchor([])}}
-      assert {[], _judge} = Slots.note(Slots.new(options()), 100, places([right], 100))
+      known = moment(places: places([right], 100))
+      assert {[], _judge} = note(Slots, Slots.new(options()), 100, known)
     end
   end
 
@@ -170,11 +195,17 @@ defmodule Sim.InvariantsTest do
     end
 
     defp driven(bodies, held \\ [], lifted \\ []) do
+      stop = %EStop.State{held: if(held == [], do: [], else: [7])}
+
       {found, _judge} =
         bodies
         |> Enum.with_index(1)
-        |> Enum.flat_map_reduce(Limits.new(), fn {body, k}, judge ->
-          Limits.note(judge, 100 * k, [body], held, lifted)
+        |> Enum.flat_map_reduce(Limits.new(options()), fn {body, k}, judge ->
+          known =
+            moment(claims: [mag1: %{}], stops: %{mag1: stop}, world: %{robots: %{mag1: body}})
+
+          stages = for id <- lifted, do: %{stage: :displaced, robot: id, at_s: k / 10}
+          note(Limits, judge, 100 * k, put_in(known.run_log.stages, stages))
         end)
 
       Enum.map(found, & &1.invariant)
@@ -215,11 +246,11 @@ defmodule Sim.InvariantsTest do
     judge = Stops.new(options())
 
     assert {%Violation{invariant: :stop_lost, robots: [:mag2], at_ms: 2_200}, _judge} =
-             first(Stops, judge, 100, [stops, [[:mag1, :mag2]]])
+             first(Stops, judge, 100, stops: stops, parts: [[:mag1, :mag2]])
 
-    assert {nil, _judge} = first(Stops, judge, 100, [stops, [[:mag1], [:mag2]]])
+    assert {nil, _judge} = first(Stops, judge, 100, stops: stops, parts: [[:mag1], [:mag2]])
     cleared = %{stops | mag2: %EStop.State{cleared: [7]}}
-    assert {nil, _judge} = first(Stops, judge, 100, [cleared, [[:mag1, :mag2]]])
+    assert {nil, _judge} = first(Stops, judge, 100, stops: cleared, parts: [[:mag1, :mag2]])
   end
 
   describe "a whole run" do
@@ -228,23 +259,24 @@ defmodule Sim.InvariantsTest do
       trial
     end
 
+    defp tick(judge, trial), do: Invariants.tick(judge, Moment.of(trial))
     defp names(judge), do: judge |> Invariants.violations() |> Enum.map(& &1.invariant)
 
     test "a contact of the world is a collision" do
       trial = trial(%{robots: [:mag1, :mag2]})
-      judge = Invariants.new(trial)
-      assert names(Invariants.note(judge, trial)) == []
+      judge = Invariants.new(trial.options)
+      assert names(tick(judge, trial)) == []
       parties = [{:mag1, {0.0, 0.0}, 0.2}, {:mag2, {0.4, 0.0}, 0.0}]
 
       world = %{trial.world | collisions: 1, contacts: [{900, parties, :robots}]}
-      judge = Invariants.note(judge, %{trial | world: world, at_ms: 1_000})
+      judge = tick(judge, %{trial | world: world, at_ms: 1_000})
 
       assert [%Violation{invariant: :collision, at_ms: 900, robots: [:mag1, :mag2]} = one] =
                Invariants.violations(judge)
 
       assert one.figures == "mag1 at 0.00,0.00 with 0.20 m/s, mag2 at 0.40,0.00 with 0.00 m/s"
       # Told once.
-      judge = Invariants.note(judge, %{trial | world: world, at_ms: 1_100})
+      judge = tick(judge, %{trial | world: world, at_ms: 1_100})
       assert names(judge) == [:collision]
     end
 
@@ -253,22 +285,22 @@ defmodule Sim.InvariantsTest do
       silence = %{at_s: 10.0, robot: :mag1, error_m: 1.25}
       log = %{trial.run_log | stuck: %Sim.Trial.Stuck{told: [silence]}}
       trial = %{trial | run_log: log, at_ms: 30_000}
-      judge = Invariants.note(Invariants.new(trial), trial)
+      judge = tick(Invariants.new(trial.options), trial)
       assert [%Violation{invariant: :stuck, figures: figures}] = Invariants.violations(judge)
       assert figures == "1.25 m off since 10.0 s, and says nothing"
 
       faults = Sim.Trial.Faults.add(trial.faults, :frozen, :mag1, 12_000, 20_000)
       frozen = %{trial | faults: faults}
-      assert names(Invariants.note(Invariants.new(trial), frozen)) == []
+      assert names(tick(Invariants.new(trial.options), frozen)) == []
     end
 
     test "false claims are told at the end" do
       claim = %{at_s: 12.5, robot: :mag1, worst_m: 0.2, worst_5s_m: 0.7}
-      judge = Invariants.new(trial(%{}))
+      judge = Invariants.new(trial(%{}).options)
       assert names(Invariants.finish(judge, %{claims: [%{claim | worst_5s_m: 0.4}]})) == []
       judge = Invariants.finish(judge, %{claims: [claim]})
       assert [%Violation{invariant: :false_claim, at_ms: 12_500}] = Invariants.violations(judge)
-      assert Invariants.violated?(judge, :false_claim)
+      assert %Violation{} = Invariants.first(judge, :false_claim)
     end
 
     test "a claim that is being withdrawn when it is judged again is judged by its beginning" do
@@ -279,7 +311,7 @@ defmodule Sim.InvariantsTest do
       # Formed from 1.0 s on, for so many ticks.
       judged = fn ticks, claim ->
         judge =
-          Enum.reduce(1..80, Invariants.new(trial), fn k, judge ->
+          Enum.reduce(1..80, Invariants.new(trial.options), fn k, judge ->
             formed? = k > 10 and k <= 10 + ticks
 
             trial =
@@ -288,7 +320,7 @@ defmodule Sim.InvariantsTest do
                 | formed: formed?
               })
 
-            Invariants.note(judge, %{trial | at_ms: 100 * k})
+            tick(judge, %{trial | at_ms: 100 * k})
           end)
 
         names(Invariants.finish(judge, %{claims: [claim]}))
@@ -309,9 +341,9 @@ defmodule Sim.InvariantsTest do
       end
 
       trial = %{(trial |> leading.(:mag1) |> leading.(:mag2)) | at_ms: 1_000}
-      assert names(Invariants.note(Invariants.new(trial), trial)) == [:two_majorities]
+      assert names(tick(Invariants.new(trial.options), trial)) == [:two_majorities]
       frozen = %{trial | faults: Sim.Trial.Faults.add(trial.faults, :frozen, :mag1, 0, 2_000)}
-      assert names(Invariants.note(Invariants.new(trial), frozen)) == []
+      assert names(tick(Invariants.new(trial.options), frozen)) == []
     end
 
     test "an invariant that is violated ends a run; one that is not gives nothing" do

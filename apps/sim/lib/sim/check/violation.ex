@@ -1,4 +1,4 @@
-defmodule Sim.Invariants.Violation do
+defmodule Sim.Check.Violation do
   @moduledoc "Describes what was wrong in a run: which invariant, when, with which robots, and the figures in one line."
 
   @enforce_keys [:invariant, :at_ms, :robots, :figures]
@@ -14,8 +14,8 @@ defmodule Sim.Invariants.Violation do
   @doc """
   A violation as one line.
 
-      iex> violation = Sim.Invariants.Violation.new(:collision, 12_300, [:mag1, :mag2], "at 0.31 m/s")
-      iex> Sim.Invariants.Violation.line(violation)
+      iex> violation = Sim.Check.Violation.new(:collision, 12_300, [:mag1, :mag2], "at 0.31 m/s")
+      iex> Sim.Check.Violation.line(violation)
       "collision at 12.3 s, mag1 mag2: at 0.31 m/s"
   """
   @spec line(t()) :: String.t()
@@ -39,7 +39,7 @@ defmodule Sim.Invariants.Violation do
   @doc """
   The violation of a run that raised at this time; `reason` is that with which its process ends.
 
-      iex> Sim.Invariants.Violation.crash(3_100, {:badarith, [{:erlang, :/, [1, 0], []}]}).figures
+      iex> Sim.Check.Violation.crash(3_100, {:badarith, [{:erlang, :/, [1, 0], []}]}).figures
       ":badarith in :erlang.//2"
   """
   @spec crash(non_neg_integer(), reason :: term()) :: t()

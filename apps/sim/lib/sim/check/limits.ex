@@ -1,4 +1,4 @@
-defmodule Sim.Invariants.Limits do
+defmodule Sim.Check.Limits do
   @moduledoc """
   Judges what robots tell their wheels, and how they truly moved, by their profiles. Pure; fed every
   100 ms, which are two steps of the reflexes.
@@ -14,7 +14,8 @@ defmodule Sim.Invariants.Limits do
   2 s: at half a metre a second and half a metre a second squared a base needs 1 s, and 0.1 s of lag
   for each factor e down to a tenth of a millimetre a second.
   """
-  alias Sim.Invariants.Violation
+  @behaviour Sim.Check.Kind
+  alias Sim.Check.Violation
 
   @tick_s 0.1
   @slack 1.0e-6
@@ -28,13 +29,17 @@ defmodule Sim.Invariants.Limits do
           held: %{atom() => integer()}
         }
 
-  @doc "The judge at the beginning of a run."
-  @spec new() :: t()
-  def new, do: %__MODULE__{}
+  @impl Sim.Check.Kind
+  def new(_options), do: %__MODULE__{}
 
-  @doc "One tick: the living bodies, which robots a stop holds, and which have been lifted to where they are."
-  @spec note(t(), integer(), [Sim.World.Body.t()], [atom()], [atom()]) :: {[Violation.t()], t()}
-  def note(judge, at_ms, bodies, held, lifted) do
+  @impl Sim.Check.Kind
+  def note(_asked, %{stops: nil}, _judge), do: :unseen
+
+  def note(_asked, %{at_ms: at_ms, stops: stops} = moment, judge) do
+    bodies = for {id, _claim} <- moment.claims, is_map_key(stops, id), do: moment.world.robots[id]
+    held = for {id, %{held: [_ | _]}} <- stops, do: id
+    lifted = lifted(moment)
+
     before =
       for {id, {wanted, pose}} <- judge.before, into: %{} do
         {id, {wanted, if(id in lifted, do: nil, else: pose)}}
@@ -50,7 +55,14 @@ defmodule Sim.Invariants.Limits do
               moving(body, before[body.id], held[body.id], at_ms),
           do: Violation.new(invariant, at_ms, [body.id], figures)
 
-    {wrong, %{judge | before: Map.new(bodies, &{&1.id, {&1.wanted, &1.pose}}), held: held}}
+    before = Map.new(bodies, &{&1.id, {&1.wanted, &1.pose}})
+    {:never, wrong, %{judge | before: before, held: held}}
+  end
+
+  # Those that a person has put somewhere else in this step.
+  defp lifted(%{at_ms: at_ms, run_log: %{stages: newest_first}}) do
+    now = Enum.take_while(newest_first, &(round(&1.at_s * 1000) >= at_ms - 100))
+    for %{stage: :displaced, robot: id} <- now, do: id
   end
 
   defp fast(%{profile: profile, wanted: wanted} = body, before) do

@@ -1,4 +1,4 @@
-defmodule Sim.Invariants.Slots do
+defmodule Sim.Check.Slots do
   @moduledoc """
   Judges that no two followers of one leader and epoch take the same slot. Pure; fed every 100 ms.
 
@@ -7,11 +7,12 @@ defmodule Sim.Invariants.Slots do
   | `bad_anchor` | the places that a leader gives to others are valid (`c:Robot.Mission.place/2`) |
   | `same_slot` | robots do not take the same slot (`c:Robot.Mission.place/2`), as followers of one leader and epoch with a fresh reference |
 
-  An anchor is good for 1 s (docs/architecture.md, table of times), and a follower without a fresh one
+  An anchor is good for 1 s (docs/times.md), and a follower without a fresh one
   stands. So two followers may for 1 s, and for as long as letters are under way, believe a newer and an
   older order. The loss of messages does not make that longer: an anchor grows old by itself.
   """
-  alias Sim.Invariants.Violation
+  @behaviour Sim.Check.Kind
+  alias Sim.Check.Violation
 
   @fresh_ms 1_000
   # A reference is passed on along the chain, one tick a robot; relays have three at most.
@@ -22,15 +23,14 @@ defmodule Sim.Invariants.Slots do
 
   @type t :: %__MODULE__{limit_ms: pos_integer(), same: %{[atom()] => integer()}}
 
-  @doc "The judge of a run with these options."
-  @spec new(map()) :: t()
+  @impl Sim.Check.Kind
   def new(%{delay_ms: {_least, most}}),
     do: %__MODULE__{limit_ms: @fresh_ms + @slack_ms + 2 * most}
 
-  @doc "One tick: the places of the robots that can act."
-  @spec note(t(), integer(), [{atom(), {:slot, term()} | {:fault, String.t()}}]) ::
-          {[Violation.t()], t()}
-  def note(judge, at_ms, places) do
+  @impl Sim.Check.Kind
+  def note(_asked, %{places: nil}, _judge), do: :unseen
+
+  def note(_asked, %{at_ms: at_ms, places: places}, judge) do
     faults = for {id, {:fault, line}} <- places, do: Violation.new(:bad_anchor, at_ms, [id], line)
 
     taken = Enum.group_by(places, &elem(&1, 1), &elem(&1, 0))
@@ -43,14 +43,10 @@ defmodule Sim.Invariants.Slots do
 
     late =
       for {ids, since} <- Enum.sort(same), at_ms - since > judge.limit_ms do
-        Violation.new(
-          :same_slot,
-          at_ms,
-          ids,
-          "for #{Violation.decimals((at_ms - since) / 1000, 1)} s"
-        )
+        figures = "for #{Violation.decimals((at_ms - since) / 1000, 1)} s"
+        Violation.new(:same_slot, at_ms, ids, figures)
       end
 
-    {faults ++ late, %{judge | same: same}}
+    {:never, faults ++ late, %{judge | same: same}}
   end
 end
