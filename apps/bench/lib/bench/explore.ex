@@ -53,7 +53,7 @@ defmodule Bench.Explore do
       area = Coverage.area(setup.map, Enum.map(setup.robots, &Pose.point(&1.start)))
       seen = %{area: area, seen_s: nil, share: 0.0}
       run = setup |> Trial.begin() |> Run.new()
-      {%{source: trial}, seen} = Run.fold(run, seen, fn run, _ -> Run.done?(run) end, &note/3)
+      {%{source: trial}, seen} = Run.fold(run, seen, &Run.done?/1, &note/3)
       {:ok, measure(trial, look(trial, seen), plan, options)}
     end
   end

@@ -78,7 +78,7 @@ defmodule Bench.Recording do
       {%{run | source: record.(before.source, run.source)}, ticks + 1}
     end
 
-    {_run, ticks} = trial |> Run.new() |> Run.fold(0, fn run, _ -> Run.done?(run) end, each)
+    {_run, ticks} = trial |> Run.new() |> Run.fold(0, &Run.done?/1, each)
     ticks
   end
 

@@ -55,8 +55,7 @@ defmodule Console.Demo do
 
         view = view |> tell(scene) |> draw(scene)
 
-        {run, view} =
-          trial |> Run.new() |> Run.fold(view, fn run, _ -> Run.done?(run) end, &show/3)
+        {run, view} = trial |> Run.new() |> Run.fold(view, &Run.done?/1, &show/3)
 
         Output.finish(output)
         status = finish(run, view, options, (Hal.Clock.now_ms() - started) / 1000)

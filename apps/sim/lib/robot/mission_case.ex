@@ -99,7 +99,7 @@ defmodule Robot.MissionCase do
   end
 
   defp follow(trial, seen, until_ms, options) do
-    over? = fn run, _seen -> Run.at_ms(run) >= until_ms end
+    over? = &(Run.at_ms(&1) >= until_ms)
     {run, seen} = trial |> Run.new() |> Run.fold(seen, over?, &tick(&1, &2, &3, options))
     {run.source, seen}
   end

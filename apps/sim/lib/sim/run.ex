@@ -39,16 +39,10 @@ defmodule Sim.Run do
   Goes on until `over?` holds, which is asked before each step. After it `each` gets the run as it was before the step, and
   after it, with what it returned last (at first `memory`).
   """
-  @spec fold(
-          t(),
-          memory,
-          (t(), memory -> boolean()),
-          (before :: t(), t(), memory -> {t(), memory})
-        ) ::
-          {t(), memory}
-        when memory: term()
+  @spec fold(t(), memory, (t() -> boolean()), each) :: {t(), memory}
+        when memory: term(), each: (before :: t(), t(), memory -> {t(), memory})
   def fold(run, memory, over?, each) do
-    if over?.(run, memory) do
+    if over?.(run) do
       {run, memory}
     else
       {run, memory} = each.(run, step(run), memory)
@@ -67,8 +61,7 @@ defmodule Sim.Run do
   def play(run, over? \\ nil)
 
   def play(%__MODULE__{} = run, over?) do
-    over? = over? || (&done?/1)
-    {run, nil} = fold(run, nil, fn run, nil -> over?.(run) end, fn _, run, nil -> {run, nil} end)
+    {run, nil} = fold(run, nil, over? || (&done?/1), fn _, run, nil -> {run, nil} end)
     run
   end
 

@@ -4,9 +4,8 @@ defmodule Sim.Chaos.Draw do
 
   Only what is allowed is drawn, and most of it so that a fleet can form: most landmarks stand in
   the room where the fleet starts, most radios lose little, and at least half of the robots
-  survive. What happens to a run (`.Events`, `.Faults`) begins no later than 40 s before its end.
+  survive. What happens to a run begins no later than 40 s before its end.
   """
-  alias Sim.Chaos.Draw.{Events, Faults}
   alias Sim.Chaos.Random
   alias Sim.Trial.{Options, Setup}
 
@@ -14,6 +13,8 @@ defmodule Sim.Chaos.Draw do
   @mags for k <- 1..20, do: :"mag#{k}"
   @mins for k <- 1..20, do: :"min#{k}"
   @places 30
+  @rest_s 40
+  @first_s 5
 
   @typedoc "Opens a map for a fleet of so many robots, as `Sim.Floorplan.open/2` does."
   @type opener :: (String.t(), pos_integer() -> {:ok, Sim.Floorplan.t()} | {:error, String.t()})
@@ -43,8 +44,8 @@ defmodule Sim.Chaos.Draw do
 
     {:ok, plan} = open.(map, length(robots))
     {landmark, random} = landmark(landmark, random, plan, {robots, world})
-    {events, random} = Events.draw(random, robots, duration_s, &place(&1, plan, plan.room))
-    {script, random} = Faults.draw(random, robots, duration_s, radio[:loss])
+    {events, random} = events(random, robots, duration_s, &place(&1, plan, plan.room))
+    {script, random} = faults(random, robots, duration_s, radio[:loss])
     {casts, _random} = Random.weighted(random, sent: 1, drawn: 1)
 
     fixed ++
@@ -155,5 +156,153 @@ defmodule Sim.Chaos.Draw do
     if Setup.check_landmarks(plan, [{x, y}]) == :ok,
       do: {{x, y}, random},
       else: place(random, plan, rectangle, left - 1)
+  end
+
+  # So that most fleets have time to form again before the run ends.
+  defp last_s(duration_s), do: max(duration_s - @rest_s, @first_s)
+
+  # What happens during a run, in whole seconds; `place` draws where the landmark can be moved to.
+  defp events(random, robots, duration_s, place) do
+    last_s = last_s(duration_s)
+    {moves, random} = moves(random, last_s, place)
+    {kills, random} = kills(random, robots, last_s)
+    {cuts, random} = cuts(random, robots, last_s)
+    {[moves: moves, kills: kills, cuts: cuts], random}
+  end
+
+  defp moves(random, last_s, place) do
+    {count, random} = Random.weighted(random, [{0, 5}, {1, 3}, {2, 1}, {3, 1}])
+
+    {moves, random} =
+      Random.times(random, count, fn random ->
+        {place, random} = place.(random)
+        {at_s, random} = Random.whole(random, @first_s, last_s)
+        {{place, at_s}, random}
+      end)
+
+    {Enum.sort_by(moves, &elem(&1, 1)), random}
+  end
+
+  # At most half of the fleet dies.
+  defp kills(random, robots, last_s) do
+    {count, random} = Random.weighted(random, [{0, 5}, {1, 4}, {2, 2}, {3, 1}])
+
+    {kills, random} =
+      Random.times(random, min(count, div(length(robots), 2)), fn random ->
+        {leader?, random} = Random.weighted(random, [{true, 1}, {false, 1}])
+        {robot, random} = Random.pick(random, robots)
+        {at_s, random} = Random.whole(random, @first_s, last_s)
+        {{if(leader?, do: :leader, else: robot), at_s}, random}
+      end)
+
+    {Enum.sort_by(kills, fn {who, at_s} -> {at_s, who} end), random}
+  end
+
+  defp cuts(random, [_only], _last_s), do: {[], random}
+
+  defp cuts(random, robots, last_s) do
+    {count, random} = Random.weighted(random, [{0, 5}, {1, 3}, {2, 2}, {3, 1}])
+    {cuts, random} = Random.times(random, count, &cut(&1, robots, last_s))
+    {Enum.sort_by(cuts, &elem(&1, 0)), random}
+  end
+
+  defp cut(random, robots, last_s) do
+    {from_s, random} = Random.whole(random, 0, last_s - 1)
+    {length_s, random} = Random.weighted(random, short: 2, long: 3, for_ever: 1)
+
+    {to_s, random} =
+      case length_s do
+        :short -> Random.whole(random, from_s + 1, min(from_s + 5, last_s))
+        :long -> Random.whole(random, from_s + 1, min(from_s + 60, last_s))
+        :for_ever -> {:end, random}
+      end
+
+    {what, random} = what(random, robots)
+    {{from_s, to_s, what}, random}
+  end
+
+  defp what(random, robots) do
+    {kind, random} = Random.weighted(random, groups: 4, link: 2, way: 2)
+    {mixed, random} = Random.shuffle(random, robots)
+
+    case kind do
+      :groups ->
+        {first, random} = Random.whole(random, 1, length(robots) - 1)
+        {left, right} = Enum.split(mixed, first)
+        {[Enum.sort(left), Enum.sort(right)], random}
+
+      way ->
+        [a, b | _others] = mixed
+        {{way, a, b}, random}
+    end
+  end
+
+  # A script, by time: robots that freeze, or see or hear nothing for a while, parts of their program that crash or hang, a
+  # radio that becomes worse for a while, people who press the emergency stop and start again, or ask for another shape.
+  defp faults(random, robots, duration_s, loss) do
+    {count, random} = Random.weighted(random, [{0, 6}, {1, 3}, {2, 2}, {3, 1}])
+
+    {scripts, random} =
+      Random.times(random, count, fn random ->
+        {at_s, random} = Random.whole(random, @first_s, last_s(duration_s))
+        {leader?, random} = Random.weighted(random, [{true, 1}, {false, 2}])
+        {robot, random} = Random.pick(random, robots)
+
+        {kind, random} =
+          Random.weighted(random,
+            freeze: 4,
+            blind: 3,
+            deaf: 3,
+            crash: 3,
+            hang: 3,
+            loss: 2,
+            estop: 2,
+            shape: 2
+          )
+
+        script(kind, at_s, if(leader?, do: :leader, else: robot), loss, random)
+      end)
+
+    {scripts |> Enum.concat() |> Enum.sort_by(&elem(&1, 0)), random}
+  end
+
+  defp script(kind, at_s, who, _loss, random) when kind in [:freeze, :blind, :deaf] do
+    {for_s, random} = Random.number(random, 0.5, 12.0, 1)
+    {[{at_s, {kind, who, for_s}}], random}
+  end
+
+  # A robot that begins anew stands until a person starts it.
+  defp script(:crash, at_s, who, _loss, random) do
+    {role, random} = Random.pick(random, [:gate, :executive, :pilot, :estop, :comms])
+    {for_s, random} = Random.whole(random, 1, 5)
+    {[{at_s, {:crash, who, role}}, {at_s + for_s, {:tell, :all, :start}}], random}
+  end
+
+  defp script(:hang, at_s, who, _loss, random) do
+    {role, random} = Random.pick(random, [:executive, :pilot])
+    {for_s, random} = Random.number(random, 0.2, 3.0, 1)
+    {[{at_s, {:hang, who, role, for_s}}, {at_s + ceil(for_s) + 1, {:tell, :all, :start}}], random}
+  end
+
+  defp script(:loss, at_s, _who, loss, random) do
+    {share, random} = Random.number(random, 0.2, 0.5, 2)
+    {for_s, random} = Random.whole(random, 2, 30)
+    {[{at_s, {:loss, share}}, {at_s + for_s, {:loss, loss}}], random}
+  end
+
+  defp script(:estop, at_s, who, _loss, random) do
+    {for_s, random} = Random.whole(random, 2, 10)
+
+    {[
+       {at_s, {:estop, who}},
+       {at_s + for_s, {:reset}},
+       {at_s + for_s + 1, {:tell, :all, :start}}
+     ], random}
+  end
+
+  defp script(:shape, at_s, _who, _loss, random) do
+    {kind, random} = Random.pick(random, [:column, :line, :wedge, :triangle, :diamond, :circle])
+    {spacing, random} = Random.number(random, 0.8, 2.0, 1)
+    {[{at_s, {:tell, :all, {:formation, kind, spacing}}}], random}
   end
 end

@@ -1,13 +1,32 @@
 defmodule Sim.Chaos.Runner do
   @moduledoc """
-  Plays many runs side by side, and shrinks each violation. The result does not depend on how many
+  Plays many runs side by side, judges each, and shrinks each violation. The result does not depend on how many
   are played at once.
   """
-  alias Sim.Chaos.{Draw, Run, Shrink}
+  alias Sim.Chaos.{Draw, Shrink}
   alias Sim.Check.{Invariants, Violation}
+  alias Sim.{Run, Trial}
 
   # A run that violates many invariants mostly has one cause.
   @most_shrunk 2
+
+  @typedoc """
+  What became of a run: its violations, and figures for the table. `claims` counts those that can be
+  judged, `true_claims` the true ones among them.
+  """
+  @type outcome :: %{
+          violations: [Violation.t()],
+          simulated_s: float(),
+          robots: pos_integer(),
+          elections: non_neg_integer(),
+          partitions: non_neg_integer(),
+          kills: non_neg_integer(),
+          formed?: boolean(),
+          ended_formed?: boolean(),
+          claims: non_neg_integer(),
+          true_claims: non_neg_integer(),
+          rivals_s: float()
+        }
 
   @typedoc """
   A violation of a run, and the smallest run that still violates this invariant, by which violation,
@@ -21,7 +40,7 @@ defmodule Sim.Chaos.Runner do
           attempts: non_neg_integer()
         }
 
-  @type played :: %{number: pos_integer(), outcome: Run.outcome() | nil, failures: [failure()]}
+  @type played :: %{number: pos_integer(), outcome: outcome() | nil, failures: [failure()]}
 
   @typedoc "The runs by number, and whether they are clean together."
   @type report :: %{seed: integer(), runs: [played()], clean?: boolean()}
@@ -95,7 +114,7 @@ defmodule Sim.Chaos.Runner do
   end
 
   defp attempt(run) do
-    case isolated(fn -> Run.play(run) end) do
+    case isolated(fn -> judge(run) end) do
       {:ok, {:ok, outcome}} -> {outcome, outcome.violations}
       {:ok, {:error, line}} -> {nil, [Violation.new(:crash, 0, [], "not a run: " <> line)]}
       {:exit, reason} -> {nil, [Violation.crash(0, reason)]}
@@ -106,8 +125,8 @@ defmodule Sim.Chaos.Runner do
   defp isolated(function) do
     {pid, monitor} =
       spawn_monitor(fn ->
-        Sim.Trial.Memory.prepare()
-        exit({:chaos_value, Sim.Run.attempt(function)})
+        Trial.Memory.prepare()
+        exit({:chaos_value, Run.attempt(function)})
       end)
 
     receive do
@@ -134,9 +153,65 @@ defmodule Sim.Chaos.Runner do
 
   # A run that cannot even be set up raises outside its steps.
   defp again(run, invariant) do
-    case isolated(fn -> Run.first(run, invariant) end) do
+    case isolated(fn -> first(run, invariant) end) do
       {:ok, violation} -> violation
       {:exit, reason} -> if invariant == :crash, do: Violation.crash(0, reason)
     end
+  end
+
+  @doc "Plays a run to its end; the error is one line of `Sim.Trial.new/1`."
+  @spec judge(keyword()) :: {:ok, outcome()} | {:error, String.t()}
+  def judge(options) do
+    with {:ok, trial} <- Trial.new(Map.new(options)),
+         do: {:ok, trial |> judged(&Run.done?/1) |> outcome()}
+  end
+
+  @doc """
+  The first violation of this invariant, `nil` if there is none, or if there cannot be such a run. The
+  run ends with it.
+  """
+  @spec first(keyword(), atom()) :: Violation.t() | nil
+  def first(options, invariant) do
+    case Trial.new(Map.new(options)) do
+      {:ok, trial} -> first_of(trial, invariant)
+      {:error, _line} -> nil
+    end
+  end
+
+  @doc "The same of a run that was set up."
+  @spec first_of(Trial.t(), atom()) :: Violation.t() | nil
+  def first_of(%Trial{} = trial, invariant) do
+    found? = fn %{checks: [judge]} -> Invariants.first(judge, invariant) != nil end
+    run = judged(trial, &(Run.done?(&1) or found?.(&1)))
+    [judge] = run.checks
+    judge = if found?.(run), do: judge, else: Invariants.finish(judge, Run.result(run))
+    Invariants.first(judge, invariant)
+  end
+
+  defp judged(trial, over?),
+    do: trial |> Run.new([Invariants.new(trial.options)], guarded?: true) |> Run.play(over?)
+
+  defp outcome(%{checks: [judge]} = run) do
+    result = Run.result(run)
+    judge = Invariants.finish(judge, result)
+
+    judged =
+      for claim <- result.claims, (right? = Invariants.right?(judge, claim)) != nil, do: right?
+
+    told = Enum.frequencies_by(result.stages, & &1.stage)
+
+    %{
+      violations: Invariants.violations(judge),
+      simulated_s: result.simulated_s,
+      robots: result.robots,
+      elections: Map.get(told, :elected, 0),
+      kills: Map.get(told, :killed, 0),
+      partitions: length(result.agreement.heals),
+      formed?: is_map_key(told, :formed),
+      ended_formed?: Trial.formed?(run.source),
+      claims: length(judged),
+      true_claims: Enum.count(judged, & &1),
+      rivals_s: result.agreement.rivals_max_s
+    }
   end
 end

@@ -46,10 +46,7 @@ defmodule Sim.Scenario.Runner do
           {Run.t(), memory}
         when memory: term()
   def play(scenario, run, memory \\ nil, each \\ &{&1, &2}),
-    do:
-      Run.fold(run, memory, fn run, _ -> done?(scenario, run) end, fn _, run, m ->
-        each.(run, m)
-      end)
+    do: Run.fold(run, memory, &done?(scenario, &1), fn _, run, memory -> each.(run, memory) end)
 
   defp done?(scenario, %{checks: checks} = run) do
     at_s = Run.at_ms(run) / 1000

@@ -2,7 +2,7 @@ defmodule Sim.Check.InvariantsTest do
   @moduledoc "Each invariant is violated by what a test constructs, and not by what is next to it."
   use Sim.LockstepCase, async: true
   alias Hal.{Pose, Profile, Twist}
-  alias Sim.Chaos.Run
+  alias Sim.Chaos.Runner
   alias Sim.Check.{Invariants, Leaders, Limits, Slots, Stops, Violation}
   alias Sim.{Moment, Trial, World}
   alias Sim.Trial.{Faults, RunLog}
@@ -348,10 +348,10 @@ defmodule Sim.Check.InvariantsTest do
 
     test "an invariant that is violated ends a run; one that is not gives nothing" do
       run = [robots: [:mag1, :mag2], blobs: :direct, seed: 2, duration_s: 20]
-      assert Run.first(run, :collision) == nil
-      assert Run.first([robots: 12], :collision) == nil
-      assert {:ok, %{violations: [], simulated_s: 20.0, robots: 2}} = Run.play(run)
-      assert {:error, "trial option robots" <> _} = Run.play(robots: 12)
+      assert Runner.first(run, :collision) == nil
+      assert Runner.first([robots: 12], :collision) == nil
+      assert {:ok, %{violations: [], simulated_s: 20.0, robots: 2}} = Runner.judge(run)
+      assert {:error, "trial option robots" <> _} = Runner.judge(robots: 12)
     end
   end
 end

@@ -5,7 +5,7 @@ defmodule Sim.Scenario.NeverTest do
   """
   use Sim.LockstepCase, async: true
   alias Missions.Landmark.Reference
-  alias Sim.Chaos.{Run, Runner, ScenarioFile}
+  alias Sim.Chaos.{Runner, ScenarioFile}
   alias Sim.Check.{Invariants, Violation}
   alias Sim.{Scenario, Trial}
 
@@ -149,7 +149,8 @@ defmodule Sim.Scenario.NeverTest do
 
   # As `mix chaos` judges it: the line of the first violation of this invariant.
   defp by_chaos(trial, invariant) do
-    with %Violation{} = violation <- Run.first_of(trial, invariant), do: Violation.line(violation)
+    with %Violation{} = violation <- Runner.first_of(trial, invariant),
+         do: Violation.line(violation)
   end
 
   # As `mix scenario` judges its file.
