@@ -36,8 +36,8 @@ defmodule Sim.Scenario.LiveTest do
                Runner.verdicts(run)
              end)
 
-    assert_received {:look, 40, {at_ms, count, 6}}
-    assert at_ms >= 4_000 and count >= 3
+    assert_received {:look, 20, {at_ms, count, 6}}
+    assert at_ms >= 2_000 and count >= 3
     stages = for stage <- result.stages, do: {stage.stage, stage.robot}
     assert {:told, :mag69} in stages and {:frozen, :mag69} in stages
 
