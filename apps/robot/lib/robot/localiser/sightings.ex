@@ -26,6 +26,8 @@ defmodule Robot.Localiser.Sightings do
   @repeated 6
   # An object nearer than this (metres) is not used, because the camera may look over it.
   @near 0.3
+  # Of the square of the distance: a variance of the position across it that makes a bearing no line.
+  @vague 0.25
 
   @doc """
   The belief corrected by the percept's picture; `back` is the pose at exposure, relative to the
@@ -101,11 +103,54 @@ defmodule Robot.Localiser.Sightings do
       distance == nil ->
         turn(belief, picture, mark, far, bearing, slack)
 
+      vague?(belief, picture, mark, far) ->
+        place(belief, picture, mark, far, {bearing, slack, distance})
+
       true ->
         belief
         |> turn(picture, mark, far, bearing, slack)
         |> stretch(picture, mark, far, distance)
     end
+  end
+
+  # Whether the position is known so badly, beside the distance, that the noise of a bent measurement would leave nothing of it, and
+  # that of a turned vector would leave more.
+  defp vague?(belief, picture, mark, far) do
+    {belief, _exposed, {_dx, _dy, distance} = way} = meet(belief, picture, mark, far)
+    {_along, across} = spread(belief, mark, way)
+    bend = bend(across, distance)
+
+    across > @vague * distance * distance and
+      bend > elem(turned(Belief.variance(belief, {0.0, 0.0, 1.0}), distance), 1)
+  end
+
+  # A robot stands at this distance from the object, in a direction that it knows as well as its heading. The distance
+  # vector is no line of a heading; its mean and variances for a normal one are exact (statistical linearisation, Gelb 1974).
+  defp place(belief, picture, mark, far, {bearing, slack, seen}) do
+    {belief, exposed, {dx, dy, _distance}} = meet(belief, picture, mark, far)
+    {ux, uy} = {:math.cos(exposed.heading + bearing), :math.sin(exposed.heading + bearing)}
+    {scale, scales} = scale(belief, mark, -seen)
+    seen = seen / (1 + scale)
+    {mean, along, across} = turned(Belief.variance(belief, {0.0, 0.0, 1.0}), seen)
+    noise = @repeated * :math.pow(@range_share * seen + @range_sd, 2) + along
+    error = ux * dx + uy * dy - mean
+    belief = Belief.correct(belief, mark.key, error, {{ux, uy, 0.0}, scales}, noise)
+
+    {belief, now, {dx, dy, _distance}} = meet(belief, picture, mark, far)
+    noise = seen * seen * (@bearing_sd * @bearing_sd + @repeated * slack * slack) + across
+    error = ux * dy - uy * dx - mean * Pose.wrap(now.heading - exposed.heading)
+    Belief.correct(belief, mark.key, error, {{-uy, ux, mean}, {0.0, 0.0}}, noise)
+  end
+
+  # Of a vector of this length, turned by a normal angle of this variance: its mean length, and the variance of its part along
+  # and, beyond what the angle explains, across.
+  defp turned(variance, length) do
+    square = length * length
+    mean = :math.exp(-variance / 2)
+    fourth = :math.pow(mean, 4)
+
+    {length * mean, square * max((1 + fourth) / 2 - mean * mean, 0.0),
+     square * max((1 - fourth) / 2 - variance * mean * mean, 0.0)}
   end
 
   defp turn(belief, picture, mark, far, seen, slack) do
@@ -122,18 +167,18 @@ defmodule Robot.Localiser.Sightings do
   defp stretch(belief, picture, mark, far, seen) do
     {belief, _exposed, {dx, dy, distance}} = meet(belief, picture, mark, far)
 
-    {scale, scales} =
-      case mark.kind do
-        :landmark -> {elem(belief.scales, 0), {distance, 0.0}}
-        :robot -> {elem(belief.scales, 1), {0.0, distance}}
-      end
-
+    {scale, scales} = scale(belief, mark, distance)
     slope = {{-dx / distance, -dy / distance, 0.0}, scales}
     {_along, across} = spread(belief, mark, {dx, dy, distance})
-    bend = 0.75 * across * across / (distance * distance)
-    noise = @repeated * :math.pow(@range_share * distance + @range_sd, 2) + bend
+    range = @repeated * :math.pow(@range_share * distance + @range_sd, 2)
+    noise = range + bend(across, distance)
     Belief.correct(belief, mark.key, seen - distance * (1 + scale), slope, noise)
   end
+
+  defp bend(across, distance), do: 0.75 * across * across / (distance * distance)
+
+  defp scale(belief, %{kind: :landmark}, slope), do: {elem(belief.scales, 0), {slope, 0.0}}
+  defp scale(belief, %{kind: :robot}, slope), do: {elem(belief.scales, 1), {0.0, slope}}
 
   # The variances of the position relative to the object, along the line to it and across. A
   # measurement is not a linear function of the position; its second-order term counts as noise
