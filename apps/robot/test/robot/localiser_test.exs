@@ -149,6 +149,35 @@ defmodule Robot.LocaliserTest do
     end
   end
 
+  # It is unsure by 5 m and 0.6 rad, two metres from the landmark, and by as much beside where it believes to be.
+  test "a robot that is unsure by more than its distance from the landmark is found again by it, honestly" do
+    inside =
+      for seed <- 1..100 do
+        {[x, y, turn], _random} =
+          Enum.map_reduce(1..3, :rand.seed_s(:exsss, {seed, 7, 1}), fn _, random ->
+            :rand.normal_s(random)
+          end)
+
+        truth = Pose.new(30 + 5 * x, 5 * y, 0.6 * turn)
+        at = Pose.point(Pose.compose(truth, Pose.new(2.0, 0.3)))
+        landmark = %{@landmark | at: at, sd: {0.05, 0.05, 0.0}}
+        localiser = told(Localiser.new(Pose.new(0, 0)), [landmark])
+
+        {percept, _localiser} =
+          Enum.reduce(1..40, {nil, localiser}, fn k, {_, localiser} ->
+            picture = [blob("Y", truth, at, 0.15)]
+            Localiser.update(localiser, percept(Pose.new(30, 0), 100 * k, picture))
+          end)
+
+        {Pose.distance(percept.pose, truth) <= percept.uncertainty.radius,
+         percept.uncertainty.radius < 2.5}
+      end
+
+    # One draw in a hundred is so far off that the picture contradicts what it believes.
+    assert Enum.count(inside, &elem(&1, 0)) >= 90
+    assert Enum.count(inside, &elem(&1, 1)) >= 95
+  end
+
   test "an estimate that pictures contradict for long is found again" do
     localiser = Localiser.new(Pose.new(0, 0, 0.5))
     {percept, _} = settle(localiser, Pose.new(0, 0), [@landmark], 100)

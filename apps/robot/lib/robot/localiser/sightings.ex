@@ -26,7 +26,7 @@ defmodule Robot.Localiser.Sightings do
   @repeated 6
   # An object nearer than this (metres) is not used, because the camera may look over it.
   @near 0.3
-  # Of the square of the distance: a variance of the position across it that makes a bearing no line.
+  # Of the square of a distance: a variance of the position beside which a bearing is no line.
   @vague 0.25
 
   @doc """
@@ -103,7 +103,7 @@ defmodule Robot.Localiser.Sightings do
       distance == nil ->
         turn(belief, picture, mark, far, bearing, slack)
 
-      vague?(belief, picture, mark, far) ->
+      vague?(belief, picture, mark, far, {bearing, distance}) ->
         place(belief, picture, mark, far, {bearing, slack, distance})
 
       true ->
@@ -113,44 +113,43 @@ defmodule Robot.Localiser.Sightings do
     end
   end
 
-  # Whether the position is known so badly, beside the distance, that the noise of a bent measurement would leave nothing of it, and
-  # that of a turned vector would leave more.
-  defp vague?(belief, picture, mark, far) do
-    {belief, _exposed, {_dx, _dy, distance} = way} = meet(belief, picture, mark, far)
-    {_along, across} = spread(belief, mark, way)
-    bend = bend(across, distance)
-
-    across > @vague * distance * distance and
-      bend > elem(turned(Belief.variance(belief, {0.0, 0.0, 1.0}), distance), 1)
+  # Whether the position is known so badly, beside the distance that was seen, that the noise of a bent measurement would leave
+  # nothing of it. What is unknown of a position only because the heading is does not count: it was found so before.
+  defp vague?(belief, picture, mark, far, {bearing, seen}) do
+    {belief, exposed, _way} = meet(belief, picture, mark, far)
+    {ux, uy} = {:math.cos(exposed.heading + bearing), :math.sin(exposed.heading + bearing)}
+    along = Belief.variance(belief, {ux, uy, 0.0}, mark)
+    across = Belief.variance(belief, {-uy, ux, seen}, mark)
+    max(along, across) > @vague * seen * seen
   end
 
-  # A robot stands at this distance from the object, in a direction that it knows as well as its heading. The distance
-  # vector is no line of a heading; its mean and variances for a normal one are exact (statistical linearisation, Gelb 1974).
+  # A robot stands at this distance from the object, in a direction that it knows as well as its heading. So the place of the
+  # object is a linear function of the position; of the heading it is an arc, whose deviation from a line counts as noise.
   defp place(belief, picture, mark, far, {bearing, slack, seen}) do
     {belief, exposed, {dx, dy, _distance}} = meet(belief, picture, mark, far)
     {ux, uy} = {:math.cos(exposed.heading + bearing), :math.sin(exposed.heading + bearing)}
     {scale, scales} = scale(belief, mark, -seen)
     seen = seen / (1 + scale)
-    {mean, along, across} = turned(Belief.variance(belief, {0.0, 0.0, 1.0}), seen)
+    {along, across} = arc(Belief.variance(belief, {0.0, 0.0, 1.0}), seen)
     noise = @repeated * :math.pow(@range_share * seen + @range_sd, 2) + along
-    error = ux * dx + uy * dy - mean
+    error = ux * dx + uy * dy - seen
     belief = Belief.correct(belief, mark.key, error, {{ux, uy, 0.0}, scales}, noise)
 
     {belief, now, {dx, dy, _distance}} = meet(belief, picture, mark, far)
     noise = seen * seen * (@bearing_sd * @bearing_sd + @repeated * slack * slack) + across
-    error = ux * dy - uy * dx - mean * Pose.wrap(now.heading - exposed.heading)
-    Belief.correct(belief, mark.key, error, {{-uy, ux, mean}, {0.0, 0.0}}, noise)
+    error = ux * dy - uy * dx - seen * Pose.wrap(now.heading - exposed.heading)
+    Belief.correct(belief, mark.key, error, {{-uy, ux, seen}, {0.0, 0.0}}, noise)
   end
 
-  # Of a vector of this length, turned by a normal angle of this variance: its mean length, and the variance of its part along
-  # and, beyond what the angle explains, across.
-  defp turned(variance, length) do
+  # The mean squares, along and across, by which a vector of this length that is turned by a normal angle of this variance is
+  # off the tangent: E (1 - cos a)^2 and E (sin a - a)^2, with E cos a = exp(-v / 2) and E a sin a = v exp(-v / 2).
+  defp arc(variance, length) do
     square = length * length
     mean = :math.exp(-variance / 2)
     fourth = :math.pow(mean, 4)
 
-    {length * mean, square * max((1 + fourth) / 2 - mean * mean, 0.0),
-     square * max((1 - fourth) / 2 - variance * mean * mean, 0.0)}
+    {square * max(1 - 2 * mean + (1 + fourth) / 2, 0.0),
+     square * max((1 - fourth) / 2 - 2 * variance * mean + variance, 0.0)}
   end
 
   defp turn(belief, picture, mark, far, seen, slack) do
