@@ -49,7 +49,8 @@ defmodule Mesh.Protocol do
   `consumer` reads messages (`Mesh.Consumer`), `services` are those whose terms are let in, those in `late` at any age;
   `group` is the multicast address that heartbeats go to besides, `addresses` are this node's own, `links` the nodes
   to which the distribution is connected, `spoke_ms` when a robot of this node was last heard by all, `challenged` when a
-  sender that cannot be believed was last challenged; `second` is the one in which `strange` counts datagrams from outside the fleet.
+  sender that cannot be believed was last challenged; `second` is the one in which `strange` counts datagrams from outside
+  the fleet.
   """
   @type t :: %__MODULE__{
           secret: Mesh.Secret.t(),
