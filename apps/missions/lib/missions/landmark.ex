@@ -7,7 +7,7 @@ defmodule Missions.Landmark do
 
   | part | decides |
   |---|---|
-  | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
+  | `LandmarkTrack` | where the landmark is, by the robot's own camera |
   | `Lookout`, `Coverage` | where it looks next, and what has been looked at |
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
   | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed; `.Loss` what it does without the landmark |

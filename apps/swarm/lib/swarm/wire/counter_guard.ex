@@ -1,7 +1,7 @@
 defmodule Swarm.Wire.CounterGuard do
   @moduledoc """
   Bounds how far others may raise a number that all robots count up, such as that of a leadership.
-  A robot that adopts any number that it hears is at the mercy of the first wrong one: it counts on
+  A robot that adopts any number that it hears follows the first wrong one: it counts on
   from there, and nothing is left at the end of the range. Pure; times in milliseconds.
 
   A number is admitted if it is at most a million above what was known when the present second

@@ -18,7 +18,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   @easy 0.35
   # So much farther than the nearest place (metres) it goes for one where it is less in the way.
   @aside 1.0
-  # Whose name comes first may have so much less to go back (metres).
+  # The robot whose name comes first may have so much less to go back (metres).
   @first 0.3
   # Two robots so near (metres) that have been before each other for so long, no faster than so (m/s), have judged
   # differently.
@@ -118,7 +118,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     end
   end
 
-  @doc "Whether one of these is near the robot that it meets, which needs time."
+  @doc "Whether the robot that it meets is among these, and near: it needs time."
   @spec near?(t(), [Neighbours.t()]) :: boolean()
   def near?(%__MODULE__{now: nil}, _robots), do: false
 
