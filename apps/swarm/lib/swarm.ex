@@ -72,8 +72,8 @@ defmodule Swarm do
   end
 
   @doc """
-  Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots` that take part (default
-  `:all`), and those of the mission (`Swarm.Missions`).
+  Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots`
+  that take part (default `:all`), and those of the mission (`Swarm.Missions`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])

@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Admission do
   @moduledoc false
-  # Decides whether an order is carried out: its signer and its time; whether its robots allow it now; whether its code may
+  # Decides whether an order is carried out: by its signer and time; whether its robots allow it now; whether its code may
   # come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
   alias Swarm.Replacement
   alias Robot.Names

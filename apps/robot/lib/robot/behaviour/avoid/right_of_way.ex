@@ -118,7 +118,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     end
   end
 
-  @doc "Whether the robot that it meets is among these, and near: it needs time."
+  @doc "Whether the robot that it meets is among these, and near: passing takes time."
   @spec near?(t(), [Neighbours.t()]) :: boolean()
   def near?(%__MODULE__{now: nil}, _robots), do: false
 
