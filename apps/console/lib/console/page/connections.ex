@@ -4,7 +4,7 @@ defmodule Console.Page.Connections do
   #
   # A person who has lost the page needs it at once: it has the stop button. So the newest connection is always let in, and
   # an older one ends for it. Strangers, which have not made a whole request that the page answers (with its token, where
-  # it has one), end only each other, and first those of the address that has most of them: silence, however long, keeps
+  # it has one), end only each other, and first those of the address that has most of them: silence, however much, keeps
   # none out and ends no page that is open.
   #
   # | state | since | how long |
