@@ -4,11 +4,11 @@ defmodule Mesh do
 
   There are two planes. Datagrams carry data that is worthless unless it is new, and they alone
   decide which nodes are alive: after a cut the next one arrives at once. Erlang's distribution
-  carries what needs an answer. A connection that has gone silent delays nobody, and one that is
+  carries what needs an answer. A connection that has gone silent delays no other, and one that is
   lost does not change any view.
 
   Without a mesh (`config :swarm, mesh: false`) a node's robots reach only each other, and nodes
-  that somebody has connected by hand. `docs/networking.md` explains how to set it up.
+  that a person has connected by hand. `docs/networking.md` explains how to set it up.
   """
   alias Mesh.Distribution
   alias Mesh.{CommandRelay, Nonblocking, Table}
@@ -142,15 +142,15 @@ defmodule Mesh do
   def rejected, do: Table.value(:rejected, %{})
 
   @doc """
-  Why this node reaches nobody, on one line, such as `"wlan0 is not connected"`: a fault of the network that has lasted
-  for 3 s in which nobody was heard. `nil` if there is none, and on a node without a mesh.
+  Why this node reaches no other, on one line, such as `"wlan0 is not connected"`: a fault of the network that has lasted
+  for 3 s in which no node was heard. `nil` if there is none, and on a node without a mesh.
   """
   @spec fault() :: String.t() | nil
   def fault, do: Table.value(:fault, nil)
 
   @doc """
   How many distribution connections were refused since the start, by reason: `stranger`, an address that is not the
-  fleet's; `too_often`; `new_names`, too many names that this node did not know; and `elsewhere`, who called another
+  fleet's; `too_often`; `new_names`, too many names that this node did not know; and `elsewhere`, a call to another
   address of this machine than that of its interface. Empty on a node that was started
   without a carrier of the mesh (`Mesh.Distribution.Access`).
   """

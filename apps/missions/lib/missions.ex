@@ -5,10 +5,10 @@ defmodule Missions do
 
   | name | module | what it does |
   |---|---|---|
-  | `landmark` | `Missions.Landmark` | finds a landmark, elects who sees it best, and follows it in formation |
+  | `landmark` | `Missions.Landmark` | finds a landmark, elects the robot that sees it best, and follows it in formation |
   | `patrol` | `Missions.Patrol` | visits points for ever, and takes over those of a robot that has died |
   | `flock` | `Missions.Flock` | keeps together on its way along a course, without a leader |
-  | `explore` | `Missions.Explore` | sees all of a building that nobody knows, and makes its map |
+  | `explore` | `Missions.Explore` | sees all of an unknown building, and makes its map |
   | `teleop` | `Missions.Teleop` | is driven by a person |
 
   A mission is fed events, and returns its phase and what is to be done:

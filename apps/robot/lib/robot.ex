@@ -17,7 +17,7 @@ defmodule Robot do
       iex> Robot.Command.parse("goto:2:1", [:mag1])
       {:ok, {:goto, 2.0, 1.0, nil}}
 
-  The processes of one robot; who is above falls with nobody below:
+  The processes of one robot; a crash of one does not restart those above it:
 
       Robot.Supervisor (rest_for_one)
       |-- Robot.Board             the newest readings, in ETS

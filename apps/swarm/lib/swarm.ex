@@ -19,7 +19,7 @@ defmodule Swarm do
 
   Every command answers within half a second: `:ok`, which means that the responsible process of
   the robot has accepted it, not that it is done, or `{:error, line}`, which names what was wrong
-  and what is allowed, or who did not answer. For commands that stop, arm or reset a robot, `:ok`
+  and what is allowed, or which part did not answer. For commands that stop, arm or reset a robot, `:ok`
   means that this has happened. Nothing raises, whatever the arguments. A command to several
   robots is `:ok` when all have accepted it; if some refuse, the error names them, and the others
   obey.
@@ -72,8 +72,8 @@ defmodule Swarm do
   end
 
   @doc """
-  Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots` (who takes
-  part, default `:all`), and those of the mission (`Swarm.Missions`).
+  Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots`
+  that take part (default `:all`), and those of the mission (`Swarm.Missions`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
@@ -315,7 +315,7 @@ defmodule Swarm do
   end
 
   @doc """
-  Lets the wheels of a robot turn (of a list, of `:all`). Real robots come up disarmed: whoever
+  Lets the wheels of a robot turn (of a list, of `:all`). Real robots come up disarmed: a person who
   arms one should stand beside it and check where it would go. Refused, with what is missing, by a
   base whose conversions are not set, by one whose line was lost while its wheels turned
   (`acknowledge/1`), and while the emergency stop holds the robot.

@@ -35,7 +35,7 @@ defmodule Agents.ContractNet do
 
   @doc """
   What a task would cost this robot; `:infinite` if it cannot do it, or does not know it. It must
-  be quick, because the robot answers nobody meanwhile.
+  be quick, because the robot answers no request meanwhile.
   """
   @callback cost(task :: term(), robot :: atom(), argument :: term()) :: Cost.t()
 
@@ -53,9 +53,9 @@ defmodule Agents.ContractNet do
   @doc """
   Announces a task to peers (`t:Agents.Conversation.peer/0`), awards it, and waits in the calling
   process until it is done; use a `Task` to do something else meanwhile. If the caller ends, the
-  work goes on, and nobody receives the result.
+  work goes on, and the result is dropped.
 
-  Options: `:from` (who asks; required), and those of `Agents.ContractNet.Manager`. Errors:
+  Options: `:from` (the asking robot; required), and those of `Agents.ContractNet.Manager`. Errors:
   `:nobody` (no peer is there, or left), `:no_bids` (none can or will), `:busy` (those that can were
   doing something else for `:wait_ms`, 5 s unless given), `:given_up` (every try failed).
   """

@@ -40,7 +40,7 @@ defmodule Agents.Conversation do
   end
 
   @doc """
-  Sends an envelope to an address: a process, or the `reply_to` of an envelope (`nil` is nobody).
+  Sends an envelope to an address: a process, or the `reply_to` of an envelope (`nil`: none).
   """
   @spec post(Envelope.address() | nil, Envelope.t()) :: :ok | {:error, :not_connected | :busy}
   def post(nil, _envelope), do: :ok
@@ -71,12 +71,12 @@ defmodule Agents.Conversation do
   end
 
   @doc """
-  Asks many peers at once, and returns their answers, and who is missing. It ends when the quorum
+  Asks many peers at once, and returns their answers, and the missing peers. It ends when the quorum
   has answered, when all that are still there have answered, or at the deadline (ms from now).
 
   Missing peers are listed in the order of the peers. The quorum is `:all` (the default),
   `:majority` of the peers asked, or a number. `:complete` says that the quorum was reached.
-  Nobody waits for a peer that cannot be reached, or that leaves meanwhile.
+  It does not wait for a peer that cannot be reached, or that leaves meanwhile.
   """
   @spec gather([peer()], Envelope.t(), deadline_ms :: non_neg_integer(), quorum()) ::
           {:complete | :partial, answers :: %{peer() => Envelope.t()}, missing :: [peer()]}

@@ -5,8 +5,8 @@ defmodule Agents.Envelope do
 
   Robots' own talk (heartbeats, rounds) is `Swarm.Message`. An envelope is for everything else: a
   service asks another, a mission assigns tasks, a topic publishes news. `check/1` checks whatever
-  arrives; after it, nobody needs to check an envelope again, but its content is the sender's, and
-  whoever reads it must check that. Nothing becomes an atom here.
+  arrives; after it, no reader needs to check an envelope again, but its content is the sender's, and
+  a reader must check that. Nothing becomes an atom here.
 
   | field | meaning |
   |---|---|

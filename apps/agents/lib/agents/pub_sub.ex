@@ -9,7 +9,7 @@ defmodule Agents.PubSub do
       :ok = Agents.PubSub.subscribe(bus, "blobs:mag1")
       :ok = Agents.PubSub.broadcast(bus, "blobs:mag1", {:blobs, []})
 
-  Whoever starts a bus supervises it, and passes `{module, name}` to its users. Topics are text.
+  The process that starts a bus supervises it, and passes `{module, name}` to its users. Topics are text.
   Messages arrive unchanged; a process that subscribes twice gets them twice. A subscription ends
   with its process, or with the bus.
   """

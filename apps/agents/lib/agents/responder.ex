@@ -157,7 +157,7 @@ defmodule Agents.Responder do
     kind, reason -> failed(kind, reason, s)
   end
 
-  # Somebody else's code runs with content from outside: whatever it does must not end the robot.
+  # Foreign code runs with content from outside: whatever it does must not end the robot.
   defp handle(envelope, s) do
     case s.module.handle(envelope, s.state) do
       {:noreply, state} -> %{s | state: state}

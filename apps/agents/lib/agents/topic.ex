@@ -7,10 +7,10 @@ defmodule Agents.Topic do
       {:ok, envelope} = Agents.Topic.next(poses, 1_000)
 
   A topic is an atom of the program, or text; on each node `{:topic, name}` is a group of the
-  directory. Nothing is kept for later subscribers, and publishing waits for nobody.
+  directory. Nothing is kept for later subscribers, and publishing does not wait.
 
   Each subscription is a small process that keeps what its owner has not asked for yet, up to a
-  limit, by the rules of `Agents.Mailbox`: a slow reader loses old telemetry, and nobody else
+  limit, by the rules of `Agents.Mailbox`: a slow reader loses old telemetry, and no other
   loses anything. It ends with its owner. A process with other things to do calls `more/1`, and
   gets one message `{:topic, subscription, envelope}` for each call. An `Agents.Responder` uses
   its option `:topics` instead.

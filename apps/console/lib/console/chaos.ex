@@ -83,7 +83,7 @@ defmodule Console.Chaos do
     end
   end
 
-  # As whoever plays the scenario sees it.
+  # Reads the file back, as `mix scenario` does.
   defp record(path) do
     recorded =
       with {:ok, scenario} <- Scenario.File.load(path),

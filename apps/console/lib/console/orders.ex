@@ -10,7 +10,7 @@ defmodule Console.Orders do
   A word of driving takes the place of the one of the same robot that still waits. It lasts from when it was said, not
   from when its turn comes.
 
-  The process waits for nobody: each order runs in a process of its own, linked to it.
+  The process does not wait: each order runs in a process of its own, linked to it.
   """
   use GenServer
   alias Console.{Prompt, Teleop}

@@ -8,13 +8,13 @@ defmodule Console.Page do
   Debian's mochiweb serves it. Its tree:
 
       Console.Page (one_for_one)
-      |-- Console.Page.Feed    asks for the scene ten times a second while somebody looks
+      |-- Console.Page.Feed    asks for the scene ten times a second while a browser shows it
       `-- Console.Page.Door    a process for each connection, in which mochiweb runs; ends those that say nothing
           `-- of a WebSocket: Console.Orders carries out what is typed and clicked, Console.Page.Client tells of the robot
               that is looked at, a pusher writes the newest scene, as fast as the browser takes it; all end together, and
               the page connects again
 
-  Who may look and command is decided by `Console.Page.Access`.
+  `Console.Page.Access` decides which requests may look and command.
   """
   use Supervisor
   alias Console.Page
@@ -50,7 +50,7 @@ defmodule Console.Page do
     end
   end
 
-  # Whoever asks from here need not know the address of the machine.
+  # A browser on this machine need not know its address.
   defp url({0, 0, 0, 0}, port), do: url({127, 0, 0, 1}, port)
   defp url(address, port), do: "http://#{:inet.ntoa(address)}:#{port}/"
 

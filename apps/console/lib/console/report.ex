@@ -128,7 +128,7 @@ defmodule Console.Report do
   defp outcome(%{formation: formation} = result, false),
     do: "Not in formation: #{formation.kind} led by #{result.leader}#{error(formation)}."
 
-  # Who does not claim `formed`, in the mission's own words.
+  # The robots that do not claim `formed`, in the mission's own words.
   defp short([]), do: "."
 
   defp short(robots) do
@@ -139,7 +139,7 @@ defmodule Console.Report do
       Enum.map_join(told, "; ", &"#{&1.name} is not done (#{&1.says || &1.state})") <> more <> "."
   end
 
-  # What those who look for a landmark say of that; most of them say the same.
+  # What robots that look for a landmark say of that; most of them say the same.
   defp said(%{fleet: fleet}) do
     for [%{says: says} | _] = robots when says != nil <-
           fleet |> Enum.filter(& &1.alive) |> Enum.sort_by(& &1.says) |> Enum.chunk_by(& &1.says),

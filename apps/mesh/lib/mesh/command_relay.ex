@@ -12,7 +12,7 @@ defmodule Mesh.CommandRelay do
   alias Mesh.Protocol.WireTerm
   alias Mesh.Distribution.Topology
 
-  # Nobody waits for answers later than this.
+  # No caller waits longer than this for an answer.
   @forget_ms 2_000
   @longest 16
   @most 1_000

@@ -18,14 +18,14 @@ defmodule Mesh.Consumer do
         }
 
   @doc """
-  The services (`Mesh.cast/2`) and who receives their terms: `apply(m, f, a ++ [node, term])`. Terms of
+  The services (`Mesh.cast/2`) and the functions that receive their terms: `apply(m, f, a ++ [node, term])`. Terms of
   other services are refused. Called once, before anything is heard; from then on all atoms that
   messages and terms may contain must exist, because what arrives creates none.
   """
   @callback services() :: %{atom() => {module(), atom(), list()}}
 
   @doc """
-  The services whose terms are taken however old they are, and whoever forwards them: what stops
+  The services whose terms are taken however old they are, and from any forwarder: what stops
   robots. All other terms, and all messages, must have been made within the last 2 s.
   """
   @callback late() :: [atom()]

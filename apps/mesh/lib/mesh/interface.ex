@@ -129,7 +129,7 @@ defmodule Mesh.Interface do
     do: Enum.any?(machine.(), &(name(&1) == card and has?(&1, called)))
 
   @doc """
-  Why nobody can be reached by it, on one line; `nil` if there is no reason in the machine itself.
+  Why no node can be reached by it, on one line; `nil` if there is no reason in the machine itself.
 
       iex> lo = {"lo", [:up, :loopback, :running], [{127, 0, 0, 1}]}
       iex> eth0 = {"eth0", [:up], [{10, 0, 0, 7}]}

@@ -14,7 +14,7 @@ defmodule Mesh.Options do
   | `strategies` | further ways to find nodes, `[{Module, options}]` (`Mesh.Strategy`) |
   | `topologies` | those of `libcluster`, if it is installed (`MIX_TARGET`): any of its strategies then connects nodes |
   | `dist_port` | the port that this node's distribution listens on; default: that of `Mesh.Distribution.Epmd`, or 0 if there is an epmd to ask |
-  | `allow` | who may open a distribution connection besides the fleet's nodes that are heard: addresses and networks, `["10.0.0.20", "10.0.1.0/24"]`; for nodes that were started with a carrier of the mesh (`Mesh.Distribution.Access`) |
+  | `allow` | what may open a distribution connection besides the fleet's nodes that are heard: addresses and networks, `["10.0.0.20", "10.0.1.0/24"]`; for nodes that were started with a carrier of the mesh (`Mesh.Distribution.Access`) |
   | `full_mesh` | up to this number of nodes each is connected to each; default 30 |
   | `degree` | above that, each is connected to about this many others, 2 to 30; default 8 |
   """

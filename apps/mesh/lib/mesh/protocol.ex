@@ -8,10 +8,10 @@ defmodule Mesh.Protocol do
   | `{:send, address, datagram}` | out by UDP |
   | `{:deliver, to, node, message}` | a message from there for these robots of this node, or `:all` |
   | `{:beat, robot, node, {boot, sequence}}` | a heartbeat of a robot there |
-  | `{:serve, service, node, term}` | for who takes that service's terms |
+  | `{:serve, service, node, term}` | for the receiver of that service's terms |
   | `{:node, change, node}` | `:up`, `:suspect`, `:gone` |
   | `{:learn, name, ip, port}` | where a node's distribution listens |
-  | `{:event, name, metadata}` | for whoever logs |
+  | `{:event, name, metadata}` | for the log |
   """
   alias Mesh.Protocol.{Admission, Namesake, NodeTable, Outbox, Packet, Rejections, Roster}
   alias Mesh.Protocol.Packet.ReplayProtection
@@ -47,10 +47,10 @@ defmodule Mesh.Protocol do
           | {:event, atom(), map()}
   @typedoc """
   `consumer` reads messages (`Mesh.Consumer`), `services` are those whose terms are let in, those in `late` at any age;
-  `group` is the multicast address that heartbeats go to besides, `addresses` are this node's own, `links` to whom the
-  distribution is connected, `spoke_ms` when a robot of this node was last heard by all, `challenged` when who cannot
-  be believed was last challenged;
-  `second` is the one in which `strange` counts what nobody of the fleet has sent.
+  `group` is the multicast address that heartbeats go to besides, `addresses` are this node's own, `links` the nodes
+  to which the distribution is connected, `spoke_ms` when a robot of this node was last heard by all, `challenged` when a
+  sender that cannot be believed was last challenged; `second` is the one in which `strange` counts datagrams from outside
+  the fleet.
   """
   @type t :: %__MODULE__{
           secret: Mesh.Secret.t(),
@@ -79,7 +79,7 @@ defmodule Mesh.Protocol do
   @doc """
   A node's side of the protocol; `session` is random and new with each start, `strategies` are `{module, state}`, `group`
   is the multicast address that heartbeats go to besides, `addresses` are those that others hear this node from, `port`
-  is that of the distribution, `consumer` who reads messages, `services` are those whose terms are let in, and `late`
+  is that of the distribution, `consumer` the reader of messages, `services` are those whose terms are let in, and `late`
   those that are at any age.
   """
   @spec new(keyword()) :: t()
@@ -159,7 +159,7 @@ defmodule Mesh.Protocol do
     Outbox.seal(protocol, :message, {ids, message}, to, now_ms)
   end
 
-  @doc "Somebody who may not know this node is there: a beacon introduces it."
+  @doc "A node that may not know this one is there: a beacon introduces it."
   @spec knock(t(), address(), integer()) :: {t(), [effect()]}
   def knock(protocol, address, now_ms),
     do: Outbox.beacon(protocol, now_ms, [address])

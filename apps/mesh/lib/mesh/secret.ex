@@ -1,6 +1,6 @@
 defmodule Mesh.Secret do
   @moduledoc """
-  Holds the single secret of a fleet. Every robot has the same small file; whoever has it belongs to the fleet.
+  Holds the single secret of a fleet. Every robot has the same small file; a node that has it belongs to the fleet.
 
   Two things are derived from it, neither of which reveals the other or the secret: the key that
   signs datagrams, and the cookie of Erlang's distribution. There is no default: a node without a

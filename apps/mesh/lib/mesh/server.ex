@@ -201,7 +201,7 @@ defmodule Mesh.Server do
     }
   end
 
-  # Whoever is heard shows that there is a network.
+  # A node that is heard shows that there is a network.
   defp judge(s) do
     heard? = NodeTable.addresses(s.protocol.node_table) != []
     {fault, news} = Fault.tick(s.fault, if(heard?, do: nil, else: trouble(s)), Hal.Clock.now_ms())

@@ -8,7 +8,7 @@ defmodule Missions.Flock do
   (`Robot.Behaviour.Velocity`).
 
   How far the flock has come is a number, its leg: 0 until all members that a robot hears hang together
-  (`Missions.Flock.Members`), then k on the way to point k. Whoever sees that a leg is done counts on and tells the others, which
+  (`Missions.Flock.Members`), then k on the way to point k. One that sees a leg done counts on and tells the others, which
   take the greatest that they hear; each tells its leg once a second.
 
   Its phases are `:gather`, `:flock` and, at the last point, `:arrived`. It claims `formed` when it has arrived and the flock
@@ -32,7 +32,7 @@ defmodule Missions.Flock do
   # A leg is done when it has been for so long; the robots that come later in the order of names wait for the first.
   @done_ms 2_000
   @later_ms 2_000
-  # Who has just begun has not heard all members yet.
+  # A robot that has just begun has not heard all members yet.
   @first_ms 5_000
 
   @kept [:me, :spacing, :speed, :course, :plan]

@@ -1,13 +1,13 @@
 defmodule Missions.Landmark do
   @moduledoc """
-  Carries out the landmark mission: searches for the landmark, agrees on who sees it largest, and follows
+  Carries out the landmark mission: searches for the landmark, agrees on the robot that sees it largest, and follows
   that robot in formation while a person moves the landmark. Pure: events in, effects out.
   `Missions.Landmark.Transitions` is the table of its phases, with its `.Conditions` and what a phase begins with
   (`.Entry`); the parts of the mission are modules of their own:
 
   | part | decides |
   |---|---|
-  | `LandmarkTrack` | where the landmark is, by the robot's own eyes |
+  | `LandmarkTrack` | where the landmark is, by the robot's own camera |
   | `Lookout`, `Coverage` | where it looks next, and what has been looked at |
   | `Rounds` | when a round is opened, what is reported in it, what comes of it |
   | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed; `.Loss` what it does without the landmark |
@@ -17,9 +17,9 @@ defmodule Missions.Landmark do
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |
-  | `EpochFilter` | who is left out, because it claims an epoch that nobody can have reached |
-  | `ReferenceInbox` | whose anchor it believes, and when it joins a leader who names it |
-  | `Policy` | who may lead, and what a robot does that has lost everybody |
+  | `EpochFilter` | which robot is left out, because it claims an epoch that none can have reached |
+  | `ReferenceInbox` | whose anchor it believes, and when it joins a leader that names it |
+  | `Policy` | which robot may lead, and what one does that has lost all others |
 
   Time is `percept.at_ms`, compared with whole numbers; there are no timers.
   """
@@ -124,7 +124,7 @@ defmodule Missions.Landmark do
   def handle({:message, %{kind: :looked, from: from, body: body}}, mission) when is_list(body),
     do: still(Lookout.hear(mission, from, body))
 
-  # The receiver has checked it, but on its way to here anybody on this node may have put another.
+  # The receiver has checked it, but on its way to here any process on this node may have put in another.
   def handle({:message, message}, %{round: %{view: view}} = mission),
     do: message |> Message.check(view) |> hear(mission)
 
@@ -164,7 +164,7 @@ defmodule Missions.Landmark do
   defp pictured_ms(_mission, %{at_ms: at_ms}), do: at_ms
 
   # Without reports of where things are, a robot must not correct its pose by where they were. Until
-  # it leads for the first time, nobody has taken its places from it.
+  # it leads for the first time, no robot has taken its places from it.
   #
   # On a long search the walls of its plan correct it.
   defp unled(%{lookout: lookout, phase: phase})

@@ -4,9 +4,9 @@ defmodule Missions.Patrol do
   (`Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
   `Robot.Mission` alone.
 
-  A point is due when nobody has seen it for a quarter of the `period`; whoever is within 0.5 m of it sees it. Each robot
+  A point is due when no robot has seen it for a quarter of the `period`; a robot within 0.5 m of it sees it. Each robot
   tells the others once a second, and at once when that changes, at which point it is, and how long ago every point was
-  seen; so a robot that hears nobody visits all points by itself, and one that has died is replaced at its point within
+  seen; so a robot that hears none visits all points by itself, and one that has died is replaced at its point within
   `Missions.Patrol.Motivation.takeover_ms/0`, if another is free.
 
   Its phases are `:watch`, when it stands until a point wants it, and `:visit`. It claims `formed` while every point was seen
@@ -209,7 +209,7 @@ defmodule Missions.Patrol do
     Auction.tick(m, mission.me, tasks, mission.peers, at_ms, bids)
   end
 
-  # A point that nobody has ever seen has been due for ever.
+  # A point that no robot has ever seen has been due for ever.
   defp age_ms(mission, number), do: Ages.of(mission.seen, number, mission.now_ms)
 
   defp give_up(mission, point, outcome) do

@@ -1,10 +1,10 @@
 defmodule Missions.Teleop do
   @moduledoc """
-  Lets a person drive a robot, by keyboard or gamepad. It stands until somebody says `move`, drives while
-  that is said again, and stands again when nobody has said it for `dead_man` seconds, whatever is gone: the hand, the
+  Lets a person drive a robot, by keyboard or gamepad. It stands until a person says `move`, drives while
+  that is said again, and stands again when that has not been said for `dead_man` seconds, whatever is gone: the hand, the
   window, its machine or the network. Pure; written with the interface of `Robot.Mission` alone.
 
-  Options: `speed` (m/s) and `turn` (rad/s), beyond which it drives for nobody, and `dead_man` (s). The limits of the body,
+  Options: `speed` (m/s) and `turn` (rad/s), its upper limits, and `dead_man` (s). The limits of the body,
   sonars and bumpers, and all stops are not its business: they hold besides.
 
   Its phases are `:wait` and `:driven`. Without this mission a `move` ends the mission that a robot has; within it the robot
@@ -59,7 +59,7 @@ defmodule Missions.Teleop do
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: wait(mission)
 
-  # Nobody drives for longer than the dead man's time without a new word.
+  # The robot drives no longer than the dead man's time without a new command.
   def handle({:command, {:move, linear, turn}}, %{dead_man_ms: ms} = mission),
     do: handle({:command, {:move, linear, turn, ms / 1_000}}, mission)
 

@@ -52,12 +52,12 @@ defmodule Robot.Board do
   After its end nothing is found on it, and what is written to it has no effect.
 
   This process owns the tables, so that they survive a crash of their writers, and writes what must survive more: the
-  **e-stop latch** and `:departed`. Nobody else touches a disk, so one that is slow, or hangs, delays neither the gate's
+  **e-stop latch** and `:departed`. No other part touches a disk, so one that is slow, or hangs, delays neither the gate's
   steps nor the executive's ticks. All the rest is lost with the board, on purpose.
 
   The latch is a table of its own, written by the gate only, so that a gate that restarts is still latched. With a file
-  (real robots) it also survives a restart of the board and of the machine: the file exists while the latch is set. Who
-  must know asks by `saved/2`. A write that failed is tried again; until then `unsaved/1` says why.
+  (real robots) it also survives a restart of the board and of the machine: the file exists while the latch is set. A
+  caller that must know asks by `saved/2`. A write that failed is tried again; until then `unsaved/1` says why.
   """
   use GenServer
   alias Robot.Board.{Files, Latch}
@@ -263,7 +263,7 @@ defmodule Robot.Board do
   @spec saved(t(), then :: Robot.Config.call()) :: :ok
   def saved(%__MODULE__{} = board, {_m, _f, _a} = then), do: cast(board, {:saved, then})
 
-  @doc "Whether it does already: asked by whoever has waited long enough for `saved/2`."
+  @doc "Whether it does already: for a caller that has waited long enough for `saved/2`."
   @spec saved?(t()) :: boolean()
   def saved?(%__MODULE__{latch: latch}), do: Latch.saved?(latch)
 
@@ -346,7 +346,7 @@ defmodule Robot.Board do
     end
   end
 
-  # The tables go with the board, and who is not below it in the robot's tree may have found it a moment before.
+  # The tables go with the board, and a process not below it in the robot's tree may have found it a moment before.
   defp unless_ended(otherwise, of_table) do
     of_table.()
   rescue

@@ -27,8 +27,8 @@ defmodule Robot.Departure do
     do: Pose.distance(odometry, {0.0, 0.0}) > @left or abs(heading) > @left
 
   @doc """
-  A frame as text. References begin with the time at which their node started, so none comes twice; of a driver that
-  tells no frame nobody knows where its zero is.
+  A frame as text. References begin with the time at which their node started, so none comes twice. The zero of a
+  driver that tells no frame is unknown.
   """
   @spec frame(reference() | nil) :: frame()
   def frame(nil), do: @unknown

@@ -4,7 +4,7 @@ defmodule Robot.Devices do
 
       Robot.Devices (one_for_one)
       |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
-      |-- Vision.View          frames to pictures while somebody looks (only with a camera)
+      |-- Vision.View          frames to pictures while there is a viewer (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and what reflexes need
       |                        --> gate; whether the wheels may turn --> executive and pilot

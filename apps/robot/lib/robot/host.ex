@@ -214,7 +214,7 @@ defmodule Robot.Host do
 
   defp act({:answer, from, result}, _s, _at_ms), do: GenServer.reply(from, result)
 
-  # Whoever asked may wait for a disk; the role does not.
+  # The caller may wait for a disk; the role does not.
   defp act({:answer_saved, from}, s, _at_ms),
     do: Board.saved(s.board, {GenServer, :reply, [from]})
 

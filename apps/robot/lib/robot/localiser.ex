@@ -97,7 +97,7 @@ defmodule Robot.Localiser do
   defp renumber(%{frame_no: nil} = localiser), do: localiser
   defp renumber(%{frame_no: number} = localiser), do: %{localiser | frame_no: number + 1}
 
-  # The frame of the last leader remains valid when nobody leads any more.
+  # The frame of the last leader remains valid when no robot leads any more.
   defp join(localiser, nil), do: localiser
   defp join(%{belief: nil} = localiser, _frame), do: localiser
 
@@ -124,7 +124,7 @@ defmodule Robot.Localiser do
   defp change(localiser, frame) do
     {position, heading} = between(localiser.frame, frame)
 
-    # Who knows its place in the plan need not be turned into the frame of a leader that knows its own there.
+    # A robot that knows its place in the plan need not turn into the frame of a leader that knows its own there.
     heading = if localiser.plan? and planned?(frame, @nearly), do: 0.0, else: heading
 
     belief =
@@ -302,7 +302,7 @@ defmodule Robot.Localiser do
   defp planned?(%{start: {position, heading}}, aligned),
     do: position <= @planned and heading <= aligned
 
-  # A robot that was never led: nobody knows better how it has turned.
+  # A robot that was never led: no other knows better how it has turned.
   defp check(%{frame: nil, anchors: %{standing: colour}} = localiser, percept, back) do
     %{turn_check: check, belief: belief, odometry: odometry} = localiser
     {check, belief} = TurnCheck.see(check, belief, percept, colour, odometry, back)

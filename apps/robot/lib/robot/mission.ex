@@ -27,7 +27,7 @@ defmodule Robot.Mission do
     * `{:claim, map}` - what the robot reports about itself until the next claim: `phase:`, `standing:`, `leader:` and the fields
       of `c:claims/0` go to all robots; for people there are `blocked_by:` and `says:`, each a line or `nil`, which
       stand in its status, and `formed:`, that it has what the mission wants, which ends a run of the demo
-    * `{:claim, to, map}` - says such fields of `c:claims/0` at once to one robot, to several, or to `:all`, and to nobody else
+    * `{:claim, to, map}` - says such fields of `c:claims/0` at once to one robot, to several, or to `:all`, and to no other
     * `{:stage, name, map}` - reports an event to people; `says:` is how it is told, after the robot's name
   """
   @type effect ::
@@ -104,7 +104,7 @@ defmodule Robot.Mission do
   @type claims :: {version :: 1..65_535, struct :: module()}
 
   @doc """
-  What every heartbeat of a robot says of this mission beside its phase, whether it stands, and whom it follows
+  What every heartbeat of a robot says of this mission beside its phase, whether it stands, and which robot it follows
   (`Robot.Mission.Claim`). Others hear it in `percept.peers` as `peer.beat.claim`. A mission without this callback has nothing
   more to say.
   """
@@ -127,13 +127,13 @@ defmodule Robot.Mission do
   @type role :: :leads | :follows | :searches | :rests | :elects
 
   @doc """
-  The roles of the mission's phases and stages, for those who judge whole runs. A search is one stage of all robots; one
+  The roles of the mission's phases and stages, for judging whole runs. A search is one stage of all robots; one
   that `:rests` has nothing to do. A mission without this callback has no such phases.
   """
   @callback roles() :: %{(phase_or_stage :: atom()) => role()}
 
   @typedoc """
-  What a claim says, for those who judge whole runs: `state:` what the robot does, in one word for people, which is a phase that
+  What a claim says, for judging whole runs: `state:` what the robot does, in one word for people, which is a phase that
   `:follows` only while a follower is under way to its place; `says:` what it says of that place; `sight:` how large it sees
   what the mission looks for (millionths of its picture), and how far off (mm), `nil` if it does not.
   """
@@ -165,7 +165,7 @@ defmodule Robot.Mission do
   @callback place(mission :: term(), at_ms :: integer()) ::
               {:slot, term()} | {:fault, line :: String.t()} | nil
 
-  @doc "All phases, for those who name one in a file. Without this callback: those of `c:roles/0`."
+  @doc "All phases, for files that name one. Without this callback: those of `c:roles/0`."
   @callback phases() :: [atom()]
 
   @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
@@ -299,7 +299,7 @@ defmodule Robot.Mission do
   end
 
   @doc """
-  What messages call a mission whose name nobody has configured.
+  The name in messages of a mission without a configured name.
 
       iex> Robot.Mission.subject(Robot.Mission.Manual)
       "manual"

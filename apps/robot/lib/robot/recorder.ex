@@ -119,7 +119,7 @@ defmodule Robot.Recorder do
 
     case Enum.find_value(queues, :ok, &registered/1) do
       :ok ->
-        # A disk that hangs must not hold up whoever starts this.
+        # A disk that hangs must not delay the start.
         send(self(), :open)
         if s.rate, do: send(self(), :look)
         {:ok, later(s)}
@@ -163,7 +163,7 @@ defmodule Robot.Recorder do
     {:noreply, %{s | pictures: pictures}}
   end
 
-  # There are at most five a second of each robot, and nobody waits for the disk.
+  # There are at most five a second of each robot, and no process waits for the disk.
   def handle_info({:picture, id, picture}, %{pictures: pictures} = s)
       when pictures != nil and is_map_key(s.robots, id) do
     Pictures.taken(pictures, id)
@@ -244,7 +244,7 @@ defmodule Robot.Recorder do
 
   defp take(s, id, entry, _now_ms), do: add(s, id, entry)
 
-  # Entries that nobody can write are nothing to wait with.
+  # Entries that cannot be written are not worth waiting with.
   defp add(%{output: nil, failed: failed} = s, id, entry) when failed != nil,
     do: taken(s, [{id, entry}])
 

@@ -189,7 +189,7 @@ defmodule Robot.Replay do
   defp entry(part, :effect, what, _at_ms, _role),
     do: {%{part | recorded: [what | part.recorded]}, nil}
 
-  # The mission may be anybody's code, and may have crashed on this input in the robot, too.
+  # The mission may be foreign code, and may have crashed on this input in the robot, too.
   defp replayed(part, what, at_ms) do
     {state, effects} =
       try do

@@ -6,7 +6,7 @@ defmodule Robot.Role do
   | input | what arrives |
   |---|---|
   | `{:cast, message}` | what another part tells it |
-  | `{:ask, from, message}` | the same, and somebody waits for `{:answer, from, result}`; `from` is `nil` in a recording |
+  | `{:ask, from, message}` | the same, and a caller waits for `{:answer, from, result}`; `from` is `nil` in a recording |
   | `:tick` | its time has come (`c:period_ms/0`); with `c:perceive/3`, `{:tick, what that sees}` |
   | `{:info, message}` | whatever else reaches its process, which no role knows |
 

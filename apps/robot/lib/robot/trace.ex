@@ -8,8 +8,8 @@ defmodule Robot.Trace do
   `Robot.Role.recorded?/1` names.
 
   An entry of the kind `:begin` has the state with which a role starts, also after a crash. One of the kind `:checkpoint`
-  has a function that returns that of now. It is offered at each tick, or of a role without ticks at each cast, between two inputs; whoever wants one calls the
-  function at once, in the process that offers it.
+  has a function that returns that of now. It is offered between two inputs, at each tick, or, of a role without ticks, at
+  each cast. A reader that wants one calls the function at once, in the process that offers it.
   """
 
   @roles [:gate, :executive, :pilot, :estop]

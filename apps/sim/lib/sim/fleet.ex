@@ -122,7 +122,7 @@ defmodule Sim.Fleet do
     case module.start(setup, Keyword.take(Map.to_list(own), [:trace, :replace])) do
       {:ok, backend} ->
         s = begun(setup, {module, backend}, Hal.Clock.now_ms())
-        # Before anybody can order something else: this start would take its place.
+        # Before any other order can arrive: this start would take its place.
         if own.mission, do: ask(s, :begin)
         {:ok, s}
 
@@ -308,7 +308,7 @@ defmodule Sim.Fleet do
     s
   end
 
-  # Puts into effect who is cut off from now on.
+  # Puts into effect which robots are cut off from now on.
   defp cut(%{setup: %{options: options}} = s, now) do
     ways =
       Cuts.ways(options.cuts ++ s.severed, options.robots, now) ++

@@ -1,11 +1,11 @@
 defmodule Sim.Replay do
   @moduledoc """
   Replays a recorded run, tick by tick: each robot by what it was told (`Swarm.Replay`), and the
-  world by what the robots did and who intervened. Both must be as recorded. Pure.
+  world by what the robots did and by interventions. Both must be as recorded. Pure.
 
   The radio is not replayed: what it delivered is among the robots' inputs. The world is: the
   readings of sensors are made again, and a picture is painted again and searched for blobs, or
-  seen by geometry, as in the run. So a replay is a trial at each of its ticks, for whoever wants
+  seen by geometry, as in the run. So a replay is a trial at each of its ticks, for a caller that wants
   to see it (`trial/1`).
   """
   @behaviour Sim.Replay.Kind

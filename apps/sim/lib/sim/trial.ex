@@ -76,7 +76,7 @@ defmodule Sim.Trial do
      "no run in lockstep can have #{Enum.join(ids, ", ")} as hardware: serial lines have a time of their own"}
   end
 
-  @doc "The trial before anybody has told its robots to start."
+  @doc "The trial before its robots are told to start."
   @spec still(Setup.t()) :: t()
   def still(%Setup{options: options} = setup) do
     members = for spec <- Setup.members(setup), into: %{}, do: {spec[:id], Member.new(spec)}
@@ -204,7 +204,7 @@ defmodule Sim.Trial do
     end)
   end
 
-  # What a person hears who has told robots something.
+  # What a person who has told robots something hears.
   defp refused({:tell, _to, command}, robots, answers) do
     for {id, why} <- Client.refusals(robots, answers),
         do: {:order_refused, id, command, why}

@@ -13,7 +13,7 @@ defmodule Swarm.Camera do
       Swarm.Camera.next(:mag1, ref)
       Swarm.Camera.unsubscribe(:mag1, ref)
 
-  Pictures are made only while somebody looks, and do not leave the robot's node: they would delay
+  Pictures are made only while there is a subscriber, and do not leave the robot's node: they would delay
   the robots' messages to each other. On another node each of these functions returns an error;
   use a shell on the robot's own node (`bin/robot remote`). Nothing raises, whatever the
   arguments.

@@ -6,7 +6,7 @@ defmodule Swarm.EStop do
 
   It alone owns the state of the emergency stop (`Swarm.EStop.State`), and publishes it on the
   board under `:estop`, for all others to read. The only other copy is the gate's latch, which
-  this process sets. Who stops the gate directly (`Robot.Safety.Gate.estop/1`; of ours `mix calibrate` alone) sets
+  this process sets. A caller that stops the gate directly (`Robot.Safety.Gate.estop/1`; of ours `mix calibrate` alone) sets
   and clears it, too; the gate reports that by `:latch`, and this process follows.
 
   No other part decides, and none waits for this one: comms passes on what a
@@ -15,12 +15,12 @@ defmodule Swarm.EStop do
 
   A stop goes to gate, executive and pilot at once, so that one that hangs does not delay the
   others. The last of them, the gate, answers when the mission has ended and no older wish can
-  follow (`Robot.Control.Pilot.halt/2`); if that does not happen, nobody answers. It
-  is `:ok` once the base has reported since; if nothing reaches the wheels, or nobody can say whether it does, the answer
+  follow (`Robot.Control.Pilot.halt/2`); if that does not happen, there is no answer. It
+  is `:ok` once the base has reported since; if nothing reaches the wheels, or that is unknown, the answer
   says so, for stop, disarm and e-stop alike (`Swarm.EStop.Answer`).
 
   A reset first goes the same way: the gate is released once the robot's mission or order has
-  ended, unless somebody stops it again meanwhile.
+  ended, unless it is stopped again meanwhile.
 
   A stop is obeyed however old it is; a reset from another node bears a stamp
   (`Swarm.Order.Freshness`), which is requested here.
@@ -38,11 +38,11 @@ defmodule Swarm.EStop do
   alias Swarm.Order.Freshness
   alias Swarm.Wire.StopTags
 
-  # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release nobody
+  # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release no caller
   # would hear of stays held.
   @release_us 400_000
   @saved_ms 400
-  # For so long a stop of a robot that is stopped makes no further call. Nobody resets another robot in that time.
+  # For so long a stop of a robot that is stopped makes no further call. A person cannot reset another robot in that time.
   @anew_us 100_000
 
   @enforce_keys [:robot, :boot, :stop, :presses]
@@ -66,7 +66,7 @@ defmodule Swarm.EStop do
           reset_us: integer() | nil
         }
 
-  @typedoc "What a request is about: the stop that it was given after, when it was given, and who waits for the answer."
+  @typedoc "A request: the stop that it was given after, when it was given, and the reference of the caller that waits."
   @type about :: {pressed(), given_us :: integer(), reference() | nil}
   @type pressed :: {boot :: integer(), pressed :: non_neg_integer()}
 
@@ -132,7 +132,7 @@ defmodule Swarm.EStop do
 
   # What the one before it recorded counts. Before the first did, the gate's latch, which has survived a restart of the
   # machine, is a stop of its own. A stop that was recorded may not have reached the gate; and a direct stop of the gate
-  # since then has reached nobody: its own cast follows that.
+  # since then has reached no other robot: its own cast follows that.
   @impl Role
   def init(%Robot.Config{id: id, boot: boot}, board, _at_ms) do
     published = read(board, :estop)
@@ -225,7 +225,7 @@ defmodule Swarm.EStop do
   end
 
   # The mission or order has ended: the gate may be released, if the sender of the reset still waits for the answer, and
-  # if nobody has stopped the robot since.
+  # if the robot was not stopped since.
   defp take_in({:release, {{boot, pressed}, given_us, _ref} = about}, seen, s)
        when boot == s.boot and pressed == s.pressed do
     if seen.us - given_us < @release_us,
@@ -296,7 +296,7 @@ defmodule Swarm.EStop do
       stop == s.stop ->
         {s, []}
 
-      # It was made before a person reset this robot: somebody far away was heard only now.
+      # It was made before a person reset this robot: a distant robot was heard only now.
       s.reset_us != nil and 1_000 * age_ms > seen.us - s.reset_us ->
         s = %{s | stop: State.late(s.stop, call)}
         {s, [written_effect(s)]}
@@ -353,7 +353,7 @@ defmodule Swarm.EStop do
 
   defp become(%{stop: before} = s, stop, seen) do
     s = %{s | stop: stop}
-    # The mission ends with it: after the reset nothing moves until somebody gives a command.
+    # The mission ends with it: after the reset nothing moves until a person gives a command.
     ended = if State.held?(stop) and not State.held?(before), do: halt(nil, seen), else: []
 
     {s, [written_effect(s)] ++ latch(s) ++ ended ++ [{:cast, :comms, :stop}]}

@@ -144,7 +144,7 @@ defmodule Swarm.Member do
   @spec claim(t()) :: map()
   def claim(member), do: runner(member).claim
 
-  @doc "Who called the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
+  @doc "The callers of the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
   @spec held(t()) :: [String.t()] | nil
   def held(member) do
     stop = role(member, :estop).stop

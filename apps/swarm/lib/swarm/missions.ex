@@ -40,7 +40,7 @@ defmodule Swarm.Missions do
 
   defp unknown(name, known) do
     shown = Wording.show(name)
-    # In the notation of the one who asks.
+    # In the caller's notation.
     names = if is_binary(name), do: names(), else: Keyword.keys(known)
     {:error, "mission #{shown} is not known; #{allowed(names)}#{hint(name, shown, names)}"}
   end
@@ -199,7 +199,7 @@ defmodule Swarm.Missions do
     end
   end
 
-  # A node that was not started as a release loads no application that nobody starts.
+  # A node that was not started as a release loads no application that is not started.
   defp load_app(beam) when is_list(beam) do
     with [file] <- beam |> Path.dirname() |> Path.join("*.app") |> Path.wildcard(),
          {:ok, [{:application, app, _keys} = spec]} <- :file.consult(file),

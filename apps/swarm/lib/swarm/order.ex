@@ -64,7 +64,7 @@ defmodule Swarm.Order do
   def check({:follow, %Pose{x: x, y: y, heading: h}}),
     do: numbers(:follow, [x, y, h], @farthest, &{:follow, Pose.new(&1, &2, &3)})
 
-  # Robots tell each other this in their heartbeats and rounds. Nobody would believe a person who
+  # Robots tell each other this in their heartbeats and rounds. Robots would not believe a person who
   # says it, and the robot must not leave its mission for nothing.
   def check({word, _robot}) when word in [:subscribe, :unsubscribe],
     do:
@@ -121,7 +121,7 @@ defmodule Swarm.Order do
 
   @doc """
   Whether a robot may follow another: not itself, and none that follows it, directly or through
-  others. `leaders` says whom each robot follows.
+  others. `leaders` says which robot each follows.
 
       iex> Swarm.Order.follow(:min1, :mag1, %{mag1: nil})
       :ok

@@ -33,7 +33,7 @@ defmodule Swarm.Status do
   A robot that does not get to its place is `BLOCKED by …`, as its mission says (`blocked_by`); what that says in words of
   its own (`says`) stands there as it is.
 
-  A robot whose mission was replaced says which it was given, by whom, and why it went back (`replaced`; `Swarm.replace/2`).
+  A robot whose mission was replaced says which it got, its sender, and why it went back (`replaced`; `Swarm.replace/2`).
 
   `speed` (m/s) is what its wheels report, not what they are told: a robot that was stopped shows how
   fast it still rolls. It is as old as `age_ms` says, and `nil`, `speed unknown`, before the first report.

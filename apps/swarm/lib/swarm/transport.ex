@@ -2,7 +2,7 @@ defmodule Swarm.Transport do
   @moduledoc """
   Delivers a robot's messages to others: directly to the comms processes of robots on this node,
   and by the mesh's datagrams to those on other nodes. A node without a mesh reaches nodes that
-  somebody has connected by hand, through Erlang's distribution.
+  a person has connected by hand, through Erlang's distribution.
   """
   alias Robot.Names
   alias Mesh.Nonblocking

@@ -76,7 +76,7 @@ defmodule Swarm.Wire do
   def number?(term), do: is_integer(term) and abs(term) < @far
 
   @doc """
-  Whether a term is a number of things that are counted, none of which anybody counts on from.
+  Whether a term is a number of things that are counted, none of which is counted on from.
 
       iex> for term <- [0, 7, -1, 900_000_000], do: Swarm.Wire.count?(term)
       [true, true, false, false]
@@ -86,8 +86,8 @@ defmodule Swarm.Wire do
 
   @doc """
   Whether a term is a number that counts up for ever: of a leadership, a heartbeat, an anchor, a
-  request. Nothing counts as far as 2^64 by itself; that nobody is pushed there is the matter of
-  those who count on from what they hear (`Swarm.Wire.CounterGuard`).
+  request. Nothing counts as far as 2^64 by itself; that none is pushed there is the matter of
+  receivers that count on from what they hear (`Swarm.Wire.CounterGuard`).
 
       iex> for term <- [0, 500_000_001, -1, 1.0, 18_446_744_073_709_551_616], do: Swarm.Wire.counter?(term)
       [true, true, false, false, false]

@@ -4,11 +4,11 @@ defmodule Agents.ContractNet.Manager do
 
       announce --all have bid, or 0.5 s--> award --done--> over
          ^                                   |
-         |--- nobody bid, winner gone, ------|
+         |--- no bids, winner gone, ---------|
          |    failed, or silent for 5 s      |
          '--- all that can are busy: pause --'
 
-  The smallest `{cost, peer}` wins, so that nothing depends on who answered first. Each
+  The smallest `{cost, peer}` wins, so that the order of answers does not matter. Each
   announcement is a *round* with a number, which all its letters carry. A winner that failed is
   not asked again.
 
@@ -17,8 +17,8 @@ defmodule Agents.ContractNet.Manager do
   time. This goes on for `:wait_ms`, and does not count among the rounds; then the outcome is `:busy`.
 
   If a winner that was given up reports after all, it is told to stop; if it has
-  done the task, the task is done, and whoever is doing it now is told to stop. A task may be done
-  twice, but never not at all while somebody can do it: do not auction what must happen at most
+  done the task, the task is done, and a peer that is doing it now is told to stop. A task may be done
+  twice, but never not at all while a peer can do it: do not auction what must happen at most
   once.
 
   `start/5` takes `:bid_ms` (500), `:silence_ms` (5000), `:rounds` (3), the number of announcements, and
@@ -50,7 +50,7 @@ defmodule Agents.ContractNet.Manager do
           | {:error, :nobody | :no_bids | :busy | :given_up}
   @typedoc """
   `due_ms` is when time alone changes something; `bids` holds a cost, `:refused` or `:busy` for each
-  peer; `awarded` lists all who ever won; `round` counts the announcements, and `pauses` those of them
+  peer; `awarded` lists all that ever won; `round` counts the announcements, and `pauses` those of them
   that followed a pause; until `until_ms` busy peers are asked again; `salt` makes the pauses of one
   manager differ from those of others.
   """
@@ -187,8 +187,8 @@ defmodule Agents.ContractNet.Manager do
       else: {m, []}
   end
 
-  # Bidding closes before the deadline only if all have answered, and somebody bids or is busy: what nobody can do now
-  # somebody may be able to do in the next round.
+  # Bidding closes before the deadline only if all have answered, and one bids or is busy: what no peer can do now
+  # one may be able to do in the next round.
   defp decide(%{phase: :bidding} = m, now_ms) do
     winner = best(m)
 
@@ -246,7 +246,7 @@ defmodule Agents.ContractNet.Manager do
   defp without(m, peer),
     do: %{m | peers: List.delete(m.peers, peer), bids: Map.delete(m.bids, peer)}
 
-  # Who is bound to this manager now, and what to send to release them.
+  # The peers bound to this manager now, and what to send to release them.
   defp bound(%{phase: :working} = m), do: [{m.winner, :cancel}]
   defp bound(m), do: for({peer, cost} <- m.bids, is_number(cost), do: {peer, :reject})
 end

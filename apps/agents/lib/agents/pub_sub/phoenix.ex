@@ -2,7 +2,7 @@ if Code.ensure_loaded?(Phoenix.PubSub) do
   defmodule Agents.PubSub.Phoenix do
     @moduledoc """
     Publishes events on one node by `Phoenix.PubSub` (`Agents.PubSub`), for programs that use it anyway. Nothing is sent
-    to other nodes, because a slow connection between robots must not delay anybody.
+    to other nodes, because a slow connection between robots must not delay others.
     """
     @behaviour Agents.PubSub
 

@@ -1,6 +1,6 @@
 defmodule Agents.Topic.Subscription do
   @moduledoc false
-  # Joins the topic's group for its owner, who gets one envelope for each that it asks for.
+  # Joins the topic's group for its owner, which gets one envelope for each that it asks for.
   use GenServer
   alias Agents.{Envelope, Mailbox, Template}
   alias Swarm.Directory

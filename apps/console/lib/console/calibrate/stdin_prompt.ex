@@ -38,7 +38,7 @@ defmodule Console.Calibrate.StdinPrompt do
 
   @doc """
   Asks until the answer is valid: `check` returns `{:ok, value}`, or `{:error, line}`, which is
-  shown. Returns `:eof` if nobody can answer any more.
+  shown. Returns `:eof` at the end of the input.
   """
   @spec ask(t(), String.t(), (String.t() -> {:ok, value} | {:error, String.t()})) ::
           {:ok, value} | :eof

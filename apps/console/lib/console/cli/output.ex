@@ -38,7 +38,7 @@ defmodule Console.Cli.Output do
   def progress(%__MODULE__{} = output, text), do: IO.write(output.device, @clear <> text)
 
   @doc """
-  Redraws the progress line of whoever keeps an `output` and when it was last `drawn_ms`, ten times a second at most;
+  Redraws the progress line of a view, which keeps an `output` and the last `drawn_ms`, ten times a second at most;
   `shown` says what is done of all, and a note.
   """
   @spec redraw(view, (... -> {number(), number(), String.t()})) :: view

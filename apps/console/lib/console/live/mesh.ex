@@ -1,6 +1,6 @@
 defmodule Console.Live.Mesh do
   @moduledoc """
-  Shows the robots of the mesh that this node is part of, whoever started them: what `bin/console` shows on its page.
+  Shows the robots of the mesh that this node is part of, however they were started: what `bin/console` shows on its page.
 
   It asks four times a second for their status, and commands them, by `Swarm` alone, as a person does in a shell. No robot
   knows it: whether it hangs or dies changes nothing for them. Robots that come are shown by themselves, robots that have
@@ -56,7 +56,7 @@ defmodule Console.Live.Mesh do
 
   defp one(live, robot), do: Enum.find(GenServer.call(live, :statuses), &(&1.robot == robot))
 
-  # In the process of whoever asks, so that no robot that is slow to answer delays what is shown.
+  # In the caller's process, so that no robot that is slow to answer delays what is shown.
   @impl Console.Live
   def command(_live, command) do
     case carry_out(command) do

@@ -1,7 +1,7 @@
 defmodule Console.Live.Recording do
   @moduledoc false
   # Records a live demo into one file: robots that are processes (`Robot.Recorder`), or a run in
-  # lockstep that somebody watches (`Sim.Recorder`).
+  # lockstep that is watched (`Sim.Recorder`).
   alias Console.Cli.Output
   alias Console.Options
   alias Sim.Trial.Setup

@@ -25,7 +25,7 @@ defmodule Console.Options.Page do
          do: {:error, "a port from 0 to 65535"}
   end
 
-  @doc "Who reaches the page may move robots: beyond this machine, and behind a proxy, it needs a token."
+  @doc "A person who reaches the page may move robots: beyond this machine, and behind a proxy, it needs a token."
   @spec check(:inet.ip_address(), String.t() | nil, String.t() | nil) ::
           :ok | {:error, line :: String.t()}
   def check(address, token, origin) do

@@ -1,12 +1,12 @@
 defmodule Console.Page.Access do
   @moduledoc """
-  Decides who may look at the page and command by it. Pure.
+  Decides which requests may look at the page and command by it. Pure.
 
   A browser that shows a page of strangers may be made to call this one. It says then where it comes from (`Origin`), and
-  by which name it was sent here (`Host`): a name that somebody else has given an address of this machine is not taken.
-  On the loopback that is all; elsewhere a token is demanded in the address. Who has said it once has a cookie that is no token,
-  but a long number of this run of the page: it cannot be guessed, so nobody who is in waits behind those who guess
-  (`Console.Page.Guesses`).
+  by which name it was sent here (`Host`): a foreign name for an address of this machine is not taken.
+  On the loopback that is all; elsewhere a token is demanded in the address. A browser that has said it once has a
+  cookie that is no token, but a long number of this run of the page: it cannot be guessed, so a browser that is in never
+  waits behind those that guess (`Console.Page.Guesses`).
 
   Behind a proxy browsers know the page by the proxy's address, its `origin`. The proxy may pass on their `Host` or say its own.
   """
@@ -18,7 +18,7 @@ defmodule Console.Page.Access do
           session: String.t() | nil
         }
 
-  @typedoc "The page's token and what the cookie of those says who have said it, and the origin of its proxy; `nil` for none."
+  @typedoc "The page's token, the cookie of browsers that have said it, and the origin of its proxy; `nil` for none."
   @type guard :: %{token: String.t() | nil, session: String.t(), origin: String.t() | nil}
 
   @doc "Whether only this machine reaches the address."

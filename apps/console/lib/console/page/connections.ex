@@ -2,10 +2,10 @@ defmodule Console.Page.Connections do
   @moduledoc false
   # Decides which connections of the page stay. Pure; time in ms.
   #
-  # Whoever has lost the page needs it at once: it has the stop button. So the newest connection is always let in, and an
-  # older one ends for it. Strangers, who have not made a whole request yet that the page answers (with its token, where it
-  # has one), end only each other, and first those of the address that has most of them: silence, however much of it, keeps
-  # nobody out and ends no page that is open.
+  # A person who has lost the page needs it at once: it has the stop button. So the newest connection is always let in, and
+  # an older one ends for it. Strangers, which have not made a whole request that the page answers (with its token, where
+  # it has one), end only each other, and first those of the address that has most of them: silence, however much, keeps
+  # none out and ends no page that is open.
   #
   # | state | since | how long |
   # |---|---|---|
@@ -23,7 +23,7 @@ defmodule Console.Page.Connections do
   @type state :: :stranger | :busy | :idle | :live
   @type t :: %__MODULE__{all: %{pid() => {:inet.ip_address(), state(), since_ms :: integer()}}}
 
-  @doc "A stranger has come; returns who ends for it."
+  @doc "A stranger has come; returns the connections that end for it."
   @spec add(t(), pid(), :inet.ip_address(), integer()) :: {t(), [pid()]}
   def add(connections, pid, address, now_ms),
     do: connections |> put(pid, {address, :stranger, now_ms}) |> crowded()

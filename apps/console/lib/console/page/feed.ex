@@ -1,6 +1,6 @@
 defmodule Console.Page.Feed do
   @moduledoc false
-  # Asks for the scene ten times a second while somebody looks, and gives it as JSON to those who are ready for it.
+  # Asks for the scene ten times a second while a browser shows it, and gives it as JSON to the pushers that are ready.
   #
   # A pusher that is still writing gets the newest scene when it asks again, so that a slow browser sees fewer of them, and
   # nothing queues.
@@ -26,11 +26,11 @@ defmodule Console.Page.Feed do
   @spec map(pid()) :: String.t()
   def map(feed), do: GenServer.call(feed, :map)
 
-  @doc "Whom to command: the module and the fleet (`Console.Live`)."
+  @doc "The receiver of commands: the module and the fleet (`Console.Live`)."
   @spec source(pid()) :: {module(), term()}
   def source(feed), do: GenServer.call(feed, :source)
 
-  @doc "What happened to a robot while somebody looked, and what the fleet tells of it: lines, the last the newest."
+  @doc "What happened to a robot while the page was shown, and what the fleet tells of it: lines, the last the newest."
   @spec events(pid(), atom()) :: [String.t()]
   def events(feed, robot), do: GenServer.call(feed, {:events, robot})
 

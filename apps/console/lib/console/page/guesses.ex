@@ -3,7 +3,7 @@ defmodule Console.Page.Guesses do
   # Decides how often an address may say a token, and when a wrong one is worth a line. Pure; time in ms.
   #
   # Five wrong ones at once and two a second in the long run; then none is looked at, the right one neither, or the rate would
-  # mean nothing. Who is in already has another proof than the token (`Console.Page.Access`), and is not asked.
+  # mean nothing. A browser that is in already has another proof than the token (`Console.Page.Access`), and is not asked.
   alias Mesh.Distribution.Access.Bucket
 
   @at_once 5

@@ -1,7 +1,7 @@
 defmodule Console.Replay.Guard do
   @moduledoc false
   # Runs what reads a recording in a process of its own, within bounds of memory and of processor time. A recording may be
-  # anybody's: what it holds has the right form and checksums, and yet may be what no robot of ours has been told, on which
+  # foreign: what it holds has the right form and checksums, and yet may be what no robot of ours has been told, on which
   # a replay fails, or does not end.
 
   # Of the process's heap.

@@ -33,7 +33,7 @@ defmodule Console.Replay.Moment do
     end
   end
 
-  # Who has no map has no truth either.
+  # A scene without a map has no truth either.
   defp words(robot, scene, doing) do
     silent? = scene.map == nil and not robot.alive
 

@@ -38,7 +38,7 @@ defmodule Console.Replay.Session do
   defp status(%{differs?: true}), do: 2
   defp status(_session), do: 0
 
-  # On a terminal a person sees what he types; nobody sees what comes from a file or a program.
+  # A terminal shows what a person types; what comes from a file or a program is not shown.
   defp typed?, do: match?({:ok, %File.Stat{type: :device}}, File.stat("/dev/stdin"))
 
   defp ask(session) do
@@ -95,7 +95,7 @@ defmodule Console.Replay.Session do
   defp moved(before, move) do
     session = move.(%{before | differs?: false})
     Output.finish(session.output)
-    # Whoever goes back is told what happened at the tick where he is.
+    # After going back, tells what happened at the tick reached.
     back? = Cursor.at_ms(session.cursor) < Cursor.at_ms(before.cursor)
     from = if back?, do: known_before(session), else: length(stages(before))
     events = stages(session) |> Enum.drop(from) |> Enum.map(&Format.stage/1)

@@ -1,7 +1,7 @@
 defmodule Console.Scenario.Recording do
   @moduledoc false
   # Records the run of a scenario for `mix replay`. The run is made again: the same scenario gives the same run, so
-  # nothing is recorded of runs that nobody wants to look at.
+  # runs that are not looked at are not recorded.
   alias Sim.{Recorder, Scenario, Trial}
   alias Sim.Scenario.Runner
 

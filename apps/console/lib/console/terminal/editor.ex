@@ -3,7 +3,7 @@ defmodule Console.Terminal.Editor do
   # Edits a line, key by key: moving, deleting, history, completion. Pure.
   #
   # The view draws it, so the terminal itself must not echo. A line ends at `:most` bytes and a
-  # character beyond them, so that whoever reads it sees that it was longer; the rest is dropped.
+  # character beyond them, so that its reader sees that it was longer; the rest is dropped.
 
   defstruct before: "",
             behind: "",

@@ -34,7 +34,7 @@ defmodule Console.Terminal.Session do
                 page: ["there is no page: --page off"]
               ]
 
-  @doc "Runs until the time is up or somebody quits; returns the exit status."
+  @doc "Runs until the time is up or a person quits; returns the exit status."
   @spec run(Options.t(), module(), (map() -> {:ok, pid()} | {:error, String.t()})) :: 0 | 1 | 2
   def run(%Options{} = options, module, start) do
     tty = Tty.open()
@@ -92,7 +92,7 @@ defmodule Console.Terminal.Session do
     session =
       cond do
         mode != :screen -> session
-        # Else nobody would see the processes.
+        # Else the processes would not be shown.
         options.nodes -> show(session, lines ++ told)
         true -> Enum.reduce(told, session, &answer(&2, &1, :dim))
       end

@@ -98,7 +98,7 @@ defmodule Mix.Tasks.Console do
     if host =~ ~r/\A\d+\.\d+\.\d+\.\d+(:\d+)?\z/, do: "#{name}@#{fleet}", else: connect
   end
 
-  # The page goes on until somebody ends this program.
+  # The page goes on until a person ends this program.
   defp watch(live, told) do
     notice = Live.Mesh.notice(live)
 

@@ -10,12 +10,12 @@ defmodule Mesh.Distribution.Access do
   | from which signed datagrams came | for 10 minutes after the last one |
   | any other | never |
 
-  A node with an `interface` (`Mesh.Interface`) lets in who has called that, or the loopback, and nobody else.
+  A node with an `interface` (`Mesh.Interface`) lets in only calls to that, or to the loopback.
 
   Each of these has a rate, too: root of this machine, all others of this machine, each configured network and each
-  address that was heard may call 20 times at once, and 10 times a second in the long run. Who calls from a port below
-  1024 of this machine is root, since the kernel gives these to nobody else; the shells of releases do
-  (`Mesh.Distribution.CallingAddress`), so that whoever operates a robot is let in however often others call.
+  address that was heard may call 20 times at once, and 10 times a second in the long run. A caller from a port below
+  1024 of this machine is root, since the kernel gives these to no other user; the shells of releases do
+  (`Mesh.Distribution.CallingAddress`), so that the operator of a robot is let in however often others call.
 
   Without TLS, names that this node has no atom for have another rate: 20 at once, and then one a second from root,
   from all others of this machine and from all configured networks, where shells come from, but one a minute from all
@@ -23,7 +23,7 @@ defmodule Mesh.Distribution.Access do
 
   What is known is in a public table of the process that listens, so that it outlives the mesh: `Mesh.Server` writes
   what it hears, and the carrier (`Mesh.Distribution.Listener`) asks. A question costs a few lookups, and a stranger
-  leaves nothing in the table. Without a carrier there is no table, nobody asks, and what is told here is dropped.
+  leaves nothing in the table. Without a carrier there is no table, nothing asks, and what is told here is dropped.
   """
   alias Mesh.Distribution.Access.{Bucket, Networks}
   alias Mesh.{Interface, SafeTable}
@@ -120,7 +120,7 @@ defmodule Mesh.Distribution.Access do
   @spec reachable?(:inet.ip_address(), integer()) :: boolean()
   def reachable?(ip, now_ms), do: origin({ip, @reserved}, nil, now_ms) != nil
 
-  # Who it is that calls, and so whose rates count: all addresses of this machine are one, and all of a network.
+  # The caller, whose rate counts: all addresses of this machine are one, and all of a network.
   defp origin({ip, port}, called, now_ms) do
     cond do
       # The kernel drops what comes from elsewhere with an address of this machine, or to its loopback.

@@ -4,7 +4,7 @@ defmodule Mesh.Distribution.CallingAddress do
   #
   # - A node that listens on one address only, or has an interface, calls from there, since that is where others hear it.
   # - A shell of a release (`-mesh_shell true`, `rel/remote.vm.args.eex`) that root has started calls from a reserved port,
-  #   one below 1024, which the kernel gives to nobody else: so a robot tells whoever operates it from all other programs
+  #   one below 1024, which the kernel gives to no other user: so a robot tells its operator from all other programs
   #   of its machine (`Mesh.Distribution.Access`). A shell of another user calls from any port.
   alias Mesh.Interface
 
@@ -29,7 +29,7 @@ defmodule Mesh.Distribution.CallingAddress do
     end
   end
 
-  # While it is absent nobody can be called: the loopback has no way to them.
+  # While it is absent no node can be called: the loopback has no way to them.
   defp own(interface) do
     case Interface.addresses(interface, Interface.machine_or_none()) do
       [ip | _others] -> ip

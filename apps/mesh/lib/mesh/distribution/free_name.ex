@@ -27,7 +27,7 @@ defmodule Mesh.Distribution.FreeName do
   end
 
   @doc """
-  The first of these names whose port nobody listens on; the ports are those of `Mesh.Distribution.Epmd` with this
+  The first of these names whose port is free; the ports are those of `Mesh.Distribution.Epmd` with this
   environment. The error is one line for people.
   """
   @spec find([String.t(), ...], %{optional(String.t()) => String.t()}) ::

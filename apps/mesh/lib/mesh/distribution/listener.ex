@@ -2,20 +2,20 @@ defmodule Mesh.Distribution.Listener do
   @moduledoc false
   # Accepts connections of OTP's distribution in the carriers `Mesh.Distribution.Tcp_dist` and `.Tls_dist`: `:inet_tcp`,
   # but that `accept/1` returns only connections that `Mesh.Distribution.Access` lets in. It closes all others at once and
-  # accepts the next. Nothing is read from those who are refused, and no other process hears of them. Without TLS,
+  # accepts the next. Nothing is read from refused connections, and no other process hears of them. Without TLS,
   # `recv/3` then asks whether the name that opens OTP's handshake may become an atom.
   #
   # OTP accepts with the priority `max`, so that on a robot with one processor a flood would leave none to the others.
-  # From the first refusal until it lets somebody in, it therefore accepts with the priority `normal`.
+  # From the first refusal until it lets one in, it therefore accepts with the priority `normal`.
   alias Mesh.Distribution
   alias Mesh.Distribution.{Epmd, Preload}
   alias Mesh.Distribution.Access.{Networks, Refusals}
   alias Mesh.Interface
 
   @doc """
-  Creates the tables of who may connect, from `CONVOY_INTERFACE`, `CONVOY_ALLOW` and `CONVOY_PEERS`. The calling
+  Creates the tables of permitted callers, from `CONVOY_INTERFACE`, `CONVOY_ALLOW` and `CONVOY_PEERS`. The calling
   process, `:net_kernel`, owns them. A node with an interface listens on all addresses, because that of its interface
-  may come later and change, and refuses who has called another (`Mesh.Distribution.Access`).
+  may come later and change, and refuses calls to any other (`Mesh.Distribution.Access`).
   """
   @spec open() :: :ok
   def open do

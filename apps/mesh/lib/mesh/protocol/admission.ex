@@ -3,7 +3,7 @@ defmodule Mesh.Protocol.Admission do
   Describes what becomes of a packet that is signed, of the fleet and of sense: taken, answered or refused.
   Pure.
 
-  It is refused if it comes from an address that its sender does not name as its own: somebody has
+  It is refused if it comes from an address that its sender does not name as its own: another has
   forwarded it. A sender whose session or clock this node does not know is challenged
   (`Mesh.Protocol.Challenge`). Terms of the services that the consumer accepts late, such as a
   stop, are taken in both cases, if the session was once accepted.
@@ -12,7 +12,7 @@ defmodule Mesh.Protocol.Admission do
   alias Mesh.Protocol.Packet.ReplayProtection
 
   # A challenge to an address of a node, no more often than this, once because it is heard and once
-  # because it asks, and to so many of them: whoever replays datagrams of strangers gains nothing.
+  # because it asks, and to so many of them: a replay of strangers' datagrams gains nothing.
   @challenge_ms 20
   @most_challenged 1_000
 
@@ -30,7 +30,7 @@ defmodule Mesh.Protocol.Admission do
       else: take_late(protocol, packet, body, {:foreign, packet.sender}, address, now_ms)
   end
 
-  @doc "Time: forgets whom it challenged a while ago."
+  @doc "Time: forgets senders that it challenged a while ago."
   @spec tick(Mesh.Protocol.t(), integer()) :: Mesh.Protocol.t()
   def tick(protocol, now_ms) do
     lately = fn {_whom, at_ms} -> now_ms - at_ms < @challenge_ms end
@@ -51,7 +51,7 @@ defmodule Mesh.Protocol.Admission do
         protocol = %{protocol | replay: replay, node_table: node_table}
         {protocol, taken} = take(protocol, packet, node, body, address, now_ms)
 
-        # Those who have just been let in need this node's word as soon.
+        # Nodes that have just been let in need this node's word as soon.
         {protocol, sent} =
           if new?, do: Outbox.beacon(protocol, now_ms, [address]), else: {protocol, []}
 
@@ -131,7 +131,7 @@ defmodule Mesh.Protocol.Admission do
 
   defp namesake(protocol, _other, _ip, _now_ms), do: {protocol, []}
 
-  # Who cannot be believed yet may challenge this node, too, and then gets both in one.
+  # A sender that cannot be believed yet may challenge this node, too, and then gets both in one.
   defp challenge(protocol, packet, body, address, now_ms) do
     asks? = match?({:challenge, _echo}, body)
     echo = if asks?, do: {packet.session, packet.time_ms}

@@ -4,7 +4,7 @@ defmodule Mesh.Protocol.Challenge do
   Pure.
 
   A challenge is a signed datagram, and so carries its sender's session and time; a node answers
-  with these two, signed in turn. Nothing has to be remembered of a challenge: only who has the
+  with these two, signed in turn. Nothing has to be remembered of a challenge: only an owner of the
   fleet's key could have made it, and its answer names the time at which it was made. A node that
   does not know the challenger's clock either challenges it in the same datagram, so that three
   datagrams make two nodes known to each other:

@@ -7,7 +7,7 @@ defmodule Mesh.Protocol.ClockOffset do
   other at `asked_ms` by its own clock, and the signed answer carries `told_ms` by the other's.
   The answer was made after the challenge; hence what the other stamps with `told_ms + t` was made
   at `asked_ms + t` at the earliest. The age that follows is never too small, and too large by at
-  most the round trip. Whoever holds an answer back makes datagrams look older, not younger.
+  most the round trip. Holding an answer back makes datagrams look older, not younger.
 
   Both clocks may drift, because Erlang corrects its monotonic clock by up to 1 %. The age
   therefore grows by 2 % of the time since the measurement: after a minute and a half without a

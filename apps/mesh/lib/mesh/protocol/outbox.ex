@@ -4,7 +4,7 @@ defmodule Mesh.Protocol.Outbox do
   # own addresses. Pure.
   alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Rejections}
 
-  @doc "A beacon for these addresses: who is heard here, and who is connected."
+  @doc "A beacon for these addresses: which nodes are heard here, and which are connected."
   @spec beacon(Mesh.Protocol.t(), integer(), [Mesh.Protocol.address()]) ::
           {Mesh.Protocol.t(), [Mesh.Protocol.effect()]}
   def beacon(protocol, _now_ms, []), do: {protocol, []}
@@ -37,7 +37,7 @@ defmodule Mesh.Protocol.Outbox do
   end
 
   @doc """
-  A term for these addresses. It is sealed once: who hears it twice, by multicast and by name,
+  A term for these addresses. It is sealed once: a node that hears it twice, by multicast and by name,
   counts it once. What is too large for a datagram is counted as rejected.
   """
   @spec seal(

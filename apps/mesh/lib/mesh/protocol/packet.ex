@@ -12,7 +12,7 @@ defmodule Mesh.Protocol.Packet do
   half of HMAC-SHA256 with the fleet's key, over everything before it: a datagram without a valid
   signature is not processed further.
 
-  Kinds: `:beacon` (who I am, whom I know), `:message` (of a robot, read by the node's
+  Kinds: `:beacon` (the sender, the nodes that it knows), `:message` (of a robot, read by the node's
   `Mesh.Consumer`), `:service` (`Mesh.cast/2`), `:challenge` and `:answer`
   (`Mesh.Protocol.Challenge`). Payloads of the first three are terms in the external format,
   decoded without creating atoms.

@@ -1,11 +1,11 @@
 defmodule Mesh.Protocol.Rejections do
   @moduledoc false
-  # Counts what a node refuses, by reason, and in each second what nobody of the fleet has sent, by
+  # Counts what a node refuses, by reason, and in each second datagrams from outside the fleet, by
   # which `Mesh.Protocol.Packet.Filter` knows a flood. Pure.
   alias Mesh.Protocol.Packet
   alias Mesh.Protocol.Packet.ReplayProtection
 
-  # What anybody may send, and not only nodes of the fleet from their own addresses.
+  # What any sender may send, and not only nodes of the fleet from their own addresses.
   @strange [:unsigned, :not_ours, :version, :foreign]
 
   @doc "Resets the count of non-members' datagrams each second."
@@ -17,7 +17,7 @@ defmodule Mesh.Protocol.Rejections do
 
   @doc """
   Counts a datagram that was refused. One of an unknown node is signed, so that is one of ours
-  that somebody forgot to write down: it is told, once for each count of a hundred. One that comes
+  that a person forgot to write down: it is told, once for each count of a hundred. One that comes
   from a foreign address may have been changed by a router on the way: it is told at the first, the
   tenth, the hundredth, so that an attacker does not fill the log.
   """
@@ -43,7 +43,7 @@ defmodule Mesh.Protocol.Rejections do
     {%{protocol | rejected: rejected, strange: protocol.strange + strange}, []}
   end
 
-  @doc "Counts a datagram of a session that is not known: anybody may have recorded it."
+  @doc "Counts a datagram of a session that is not known: a stranger may have recorded it."
   @spec strange(Mesh.Protocol.t()) :: Mesh.Protocol.t()
   def strange(protocol), do: %{protocol | strange: protocol.strange + 1}
 

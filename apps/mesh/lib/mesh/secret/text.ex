@@ -2,7 +2,7 @@ defmodule Mesh.Secret.Text do
   @moduledoc false
   # Judges whether the text of a secret file is good enough to protect a fleet. Pure.
   #
-  # A good one is base64 or hex text of at least 32 random bytes. Nobody can prove that bytes are
+  # A good one is base64 or hex text of at least 32 random bytes. There is no proof that bytes are
   # random; this finds those that clearly are not: words, rows of keys, patterns, padding.
   import Bitwise
 

@@ -1,6 +1,6 @@
 defmodule Missions.Flock.Members do
   @moduledoc false
-  # Tracks the members of the flock that a robot hears: who they are, how far they have come, where they tell that they
+  # Tracks the members of the flock that a robot hears: their names, how far they have come, where they tell that they
   # are. Pure.
   #
   # Each tells once a second which course it has and its leg. Its pose comes with its heartbeats, 5 times a second, in the
@@ -9,7 +9,7 @@ defmodule Missions.Flock.Members do
   alias Missions.Flock.Field
   alias Robot.Percept
 
-  # Who has told nothing for so long is no member; a pose is carried on for so long; so many are remembered.
+  # A robot that has told nothing for so long is no member; a pose is carried on for so long; so many are remembered.
   @silent_ms 3_500
   @carry_s 0.5
   @most 256

@@ -6,7 +6,7 @@ defmodule Missions.Landmark.Blocker do
   |---|---|
   | `:landmark` | the landmark, in the slot or on the way to it |
   | `{:robot, id}` | a robot, dead, standing or passing, in the slot or on the way |
-  | `:unknown` | something that the sonars see, and that nobody has reported and no map shows |
+  | `:unknown` | something that the sonars see, and that no robot has reported and no map shows |
   | `:no_way` | none of these: known obstacles leave no way, or the robot finds none |
   | `:no_anchor` | the leader has not said where its place is |
   """
@@ -19,7 +19,7 @@ defmodule Missions.Landmark.Blocker do
 
   @doc """
   The blocker between a percept's pose and a slot, both in the map frame in metres; `nil` as the
-  landmark's place means that nobody knows it (`Robot.Behaviour.Blocker.find/3`).
+  landmark's place means that it is unknown (`Robot.Behaviour.Blocker.find/3`).
   """
   @spec find(Percept.t(), Pose.t(), Pose.point() | nil) :: t()
   def find(%Percept{} = percept, slot, landmark) do

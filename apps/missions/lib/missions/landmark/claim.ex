@@ -116,7 +116,7 @@ defmodule Missions.Landmark.Claim do
 
   @doc """
   A leadership lapses after a second of silence: others may have elected another leader by then. An anchor is good for as long,
-  so nobody follows a leader that has decided nothing since.
+  so no robot follows a leader that has decided nothing since.
 
       iex> Missions.Landmark.Claim.stale(%{phase: :lead, leader: :mag1, epoch: 3, formed: true, anchor: nil})
       %{phase: :agree, leader: nil, epoch: 3, formed: false, anchor: nil}

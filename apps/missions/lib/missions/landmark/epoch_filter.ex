@@ -12,10 +12,10 @@ defmodule Missions.Landmark.EpochFilter do
   alias Missions.Landmark.Claim
 
   @tell_ms 10_000
-  # More than any fleet has: whoever invents names does not fill the memory.
+  # More than any fleet has: invented names do not fill the memory.
   @most 256
 
-  @typedoc "Whom it has refused: when that was last told; and what has still to be told."
+  @typedoc "The refused robots, with when each was last told; and what has still to be told."
   @type t :: %__MODULE__{told: %{atom() => integer()}, untold: [map()]}
   defstruct told: %{}, untold: []
 

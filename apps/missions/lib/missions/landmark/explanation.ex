@@ -4,7 +4,7 @@ defmodule Missions.Landmark.Explanation do
   alias Swarm.Agreement.Round
 
   @doc """
-  The mission's state in lines, each with its label: its phase, who leads it, the last round and
+  The mission's state in lines, each with its label: its phase, its leader, the last round and
   what was reported in it, and what it found itself.
   """
   @spec lines(State.t()) :: [{label :: String.t(), text :: String.t()}]

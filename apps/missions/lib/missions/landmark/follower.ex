@@ -48,7 +48,7 @@ defmodule Missions.Landmark.Follower do
           guide: Guide.t()
         }
 
-  @doc "The state of a robot that does not follow anybody yet."
+  @doc "The state of a robot that follows none yet."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 

@@ -82,7 +82,7 @@ defmodule Missions.Landmark.LandmarkTrack do
   def fresh?(nil, _now_ms, _ms), do: false
   def fresh?(%{at_ms: at_ms}, now_ms, ms), do: now_ms - at_ms <= ms
 
-  @doc "Whether a robot that had its last picture then has had none for so long that nobody should count on its camera."
+  @doc "Whether a robot that had its last picture then has had none for so long that no robot should count on its camera."
   @spec blind?(pictured_ms :: integer() | nil, now_ms :: integer()) :: boolean()
   def blind?(nil, _now_ms), do: false
   def blind?(pictured_ms, now_ms), do: now_ms - pictured_ms >= @blind_ms

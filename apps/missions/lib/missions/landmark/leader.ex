@@ -44,7 +44,7 @@ defmodule Missions.Landmark.Leader do
   @typedoc """
   `sequence` numbers the anchors; the shape has been right since `good_ms`, or wrong since
   `bad_ms`; it is not formed since `unformed_ms`, and people were `told` of where the leader stood in which shape when it was;
-  `heard_ms` is when somebody was last known to hear this leader.
+  `heard_ms` is when a robot was last known to hear this leader.
   """
   @type t :: %__MODULE__{
           sequence: non_neg_integer(),
@@ -76,7 +76,7 @@ defmodule Missions.Landmark.Leader do
   end
 
   @doc """
-  Takes a new shape, which everyone learns from the anchor; `:cost` assigns the slots again.
+  Takes a new shape, which all learn from the anchor; `:cost` assigns the slots again.
   """
   @spec reshape(Landmark.State.t()) :: Landmark.State.t()
   def reshape(mission) do
@@ -93,7 +93,7 @@ defmodule Missions.Landmark.Leader do
   end
 
   @doc """
-  Whether a leader stops leading: it gives way to a later one, or nobody has heard it for 1.5 s
+  Whether a leader stops leading: it gives way to a later one, or no robot has heard it for 1.5 s
   though it is not alone. Under the policy `:majority` more than half of the fleet must hear it.
   """
   @spec deposed?(Landmark.State.t()) :: boolean()
@@ -150,7 +150,7 @@ defmodule Missions.Landmark.Leader do
     put_in(mission.leadership.heard_ms, max(heard_ms, mission.leadership.heard_ms))
   end
 
-  # If it is alone, nobody can hear it, and a robot that comes needs time to hear it.
+  # If it is alone, no robot can hear it, and a robot that comes needs time to hear it.
   defp hear(mission) do
     heard? =
       mission

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Lookout do
   @moduledoc false
-  # Searches from room to room, once a round has ended in which nobody had found the landmark: each robot goes to the
-  # nearest place from which it sees what nobody has looked at, turns around there, and so on until the landmark is found or
+  # Searches from room to room, once a round has ended in which no robot had found the landmark: each robot goes to the
+  # nearest place from which it sees what none has looked at, turns around there, and so on until the landmark is found or
   # nothing is left. Pure.
   #
   # Places are frontiers (`Robot.Navigation.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
@@ -116,7 +116,7 @@ defmodule Missions.Landmark.Lookout do
   end
 
   def act(mission) do
-    # Who waits for another one looks whether that is still on its way.
+    # A robot that waits for another one looks whether that is still on its way.
     lookout =
       if mission.lookout.stand, do: mission.lookout, else: Legs.choose(mission.lookout, mission)
 

@@ -113,7 +113,7 @@ defmodule Missions.Landmark.Marks do
     {grown.(@landmark_along), grown.(@landmark_across), :math.atan2(dy, dx)}
   end
 
-  # A moving robot reported where it was, and nobody knows where a dead one came to rest.
+  # A moving robot reported where it was, and it is unknown where a dead one came to rest.
   defp standing?(%{mode: :dead}), do: false
 
   defp standing?(%{mode: :moving, twist: twist}),

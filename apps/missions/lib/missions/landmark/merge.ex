@@ -4,9 +4,9 @@ defmodule Missions.Landmark.Merge do
   #
   # They hold one round, for an epoch after both, in which each reports how many robots it leads; its
   # record makes the leader of the largest part lead all (`Swarm.Agreement.Election`). The one that will
-  # probably win opens the round, once it has had time to hear of everybody; if it does not, the other
-  # opens it a little later. A leader whom nobody follows joins a later one without a round. Meanwhile
-  # nobody takes the other's followers into its order.
+  # probably win opens the round, once it has had time to hear of all robots; if it does not, the other
+  # opens it a little later. A leader that none follows joins a later one without a round. Meanwhile
+  # neither takes the other's followers into its order.
   alias Missions.Landmark
   alias Missions.Landmark.Claim
 
@@ -49,7 +49,7 @@ defmodule Missions.Landmark.Merge do
 
   def due?(_mission), do: false
 
-  @doc "Whether this leader gives way without a round: a later leadership is known, and nobody follows this one."
+  @doc "Whether this leader gives way without a round: a later leadership is known, and no robot follows this one."
   @spec yields?(Landmark.State.t()) :: boolean()
   def yields?(%{higher_ms: nil}), do: false
 
@@ -69,7 +69,7 @@ defmodule Missions.Landmark.Merge do
 
   @doc """
   Those of the given robots that another leader leads now. When parts meet, a follower may be
-  heard before its leader is, so a robot that follows somebody unheard is not free either.
+  heard before its leader is, so a robot that follows an unheard one is not free either.
   """
   @spec theirs([atom()], Landmark.State.t()) :: [atom()]
   def theirs(ids, mission) do

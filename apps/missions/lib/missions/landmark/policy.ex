@@ -2,7 +2,7 @@ defmodule Missions.Landmark.Policy do
   @moduledoc """
   Decides what a robot may do with the robots that it can reach. Pure.
 
-  **Who may lead.** `policy: :available` (the default): every part of a fleet leads itself.
+  **Which part may lead.** `policy: :available` (the default): every part of a fleet leads itself.
   `policy: :majority, of: n`: only a part with more than half of `n` robots may lead; the others
   stand still until they are a majority again, and their leader abdicates within its lease. Of 4
   robots, 2 are not enough. A robot that a leader may still count on does not report in a round
@@ -12,8 +12,8 @@ defmodule Missions.Landmark.Policy do
   only once its leader has said it in five anchors, because one wrong anchor must not keep a fleet
   from electing.
 
-  **Lost link.** A robot that was with others in this mission, and has heard nobody for 2 s, does
-  what `lost_link` says until it hears somebody:
+  **Lost link.** A robot that was with others in this mission, and has heard none for 2 s, does
+  what `lost_link` says until it hears one:
 
   | `lost_link` | what it does |
   |---|---|
@@ -22,7 +22,7 @@ defmodule Missions.Landmark.Policy do
   | `:continue` | goes on by itself: searches, and leads itself if it may |
 
   Without the option, followers stop, leaders and searchers continue; if it is given, it applies
-  to all. A robot that never met anybody cannot lose anybody.
+  to all. A robot that never met another cannot lose the link.
   """
   alias Swarm.Agreement.Election
   alias Missions.Landmark.Reference
@@ -34,7 +34,7 @@ defmodule Missions.Landmark.Policy do
   @vow_ms 1_800
   # How many anchors, ten a second, must say the same of the size of the fleet.
   @anchors 5
-  # A robot that has only just been started has heard nobody yet.
+  # A robot that has only just been started has heard none yet.
   @gather_ms 2_000
 
   @doc """
@@ -90,18 +90,18 @@ defmodule Missions.Landmark.Policy do
     end
   end
 
-  @doc "Whether a leader who is not among these may still count on this robot."
+  @doc "Whether a leader that is not among these may still count on this robot."
   @spec bound?(Landmark.State.t(), [atom()]) :: boolean()
   def bound?(%{of: of, promise: promise}, _view) when of == 0 or promise == nil, do: false
 
   def bound?(%{promise: {leader, at_ms}} = mission, view),
     do: leader not in view and mission.now_ms - at_ms < @vow_ms
 
-  @doc "Whether this robot was with others, and no longer hears anybody."
+  @doc "Whether this robot was with others, and no longer hears any."
   @spec lost?(Landmark.State.t()) :: boolean()
   def lost?(mission), do: mission.met? and not company?(mission)
 
-  @doc "Whether this robot hears anybody."
+  @doc "Whether this robot hears any other."
   @spec company?(Landmark.State.t()) :: boolean()
   def company?(mission),
     do: Landmark.State.beats(mission) != %{}

@@ -17,7 +17,7 @@ defmodule Missions.Landmark.Reference do
   requested one, which was the `asked_no`-th request; `size` and `places` say which slots of it
   are used (`Swarm.Formation.FreeSlots`), `trail` gives them pose by pose if the shape is a column
   along the leader's trail. `of` is the size of the fleet of which a majority must be together for
-  anybody to lead, 0 if none is required (`Missions.Landmark.Policy`).
+  any robot to lead, 0 if none is required (`Missions.Landmark.Policy`).
   """
   alias Swarm.Formation
   alias Swarm.Wire

@@ -3,8 +3,8 @@ defmodule Missions.Landmark.Rounds do
   Plays a robot's part in the rounds of the landmark mission: when it opens one (`.Opening`, `.Challenge`), what it
   reports (`.Report`), and what follows from the record. Pure.
 
-  A round is opened for two purposes. `:search`: everybody reports after its scan. `:change`:
-  everybody reports at once what it sees now, because the leader is gone, or another robot has
+  A round is opened for two purposes. `:search`: every robot reports after its scan. `:change`:
+  every robot reports at once what it sees now, because the leader is gone, or another robot has
   come clearly nearer to the landmark. Leader and
   followers stand still while a round is open, searchers once they have scanned.
   """

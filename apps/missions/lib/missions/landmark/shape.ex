@@ -169,12 +169,12 @@ defmodule Missions.Landmark.Shape do
       choice != nil -> chosen(shape, choice, whom, here, now)
       # A leader on its way may find room again.
       rungs == @on_the_way -> shape
-      # The request stays, so that whoever is told that it cannot be knows what.
+      # The request stays, so that the line that refuses it names it.
       true -> chosen(shape, none(asked, followers), whom, here, now)
     end
   end
 
-  # Only who could not get to its place gets another one.
+  # Only a robot that could not get to its place gets another one.
   defp refill(
          %{spots: spots, barred: barred} = shape,
          {asked, followers, _} = whom,
@@ -320,7 +320,7 @@ defmodule Missions.Landmark.Shape do
       blocked >= @many and 2 * blocked >= length(followers) ->
         max(last(mission) - shape.squeeze, 1)
 
-      # In a cluster only who is blocked gets another place.
+      # In a cluster only blocked robots get another place.
       blocked > 0 and (shape.rung == :cluster or Enum.all?(followers, rest?)) ->
         1
 

@@ -41,7 +41,7 @@ defmodule Missions.Landmark.SlotPoses do
   def landmark(%Reference{landmark: nil}), do: nil
   def landmark(%Reference{landmark: {x, y}}), do: {x / 1000, y / 1000}
 
-  @doc "The landmark of an anchor as a disc that nobody drives through, if there is one (metres)."
+  @doc "The landmark of an anchor as a disc that no robot drives through, if there is one (metres)."
   @spec discs(Reference.t()) :: [{x :: float(), y :: float(), radius :: float()}]
   def discs(anchor), do: for({x, y} <- [landmark(anchor)], do: {x, y, LandmarkTrack.radius()})
 

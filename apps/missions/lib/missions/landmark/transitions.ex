@@ -15,24 +15,24 @@ defmodule Missions.Landmark.Transitions do
   | `:lead` | tracks the landmark, tells the others where the robot is | |
   | `:follow` | drives to its slot, passes the reference on to its child | |
   | `:wait` | stands | too few robots to have a leader |
-  | `:halt` | stands | has lost everybody, `lost_link: :stop` |
-  | `:hold` | goes to the place it was last given | has lost everybody, `lost_link: :hold` |
+  | `:halt` | stands | has lost all others, `lost_link: :stop` |
+  | `:hold` | goes to the place it was last given | has lost all others, `lost_link: :hold` |
 
   | condition | holds when |
   |---|---|
   | `:started` | a person has started it |
   | `:elected`, `:led` | a round has made this robot the leader, or another one, or a leader names it in its order |
-  | `:nobody`, `:nobody_again` | a round in which nobody had found the landmark; with nothing left to look at, or the third in a row of robots that know no walls |
+  | `:nobody`, `:nobody_again` | a round in which no robot had found the landmark; with nothing left to look at, or the third in a row of robots that know no walls |
   | `:more`, `:no_more` | it searches from room to room, turned in vain, and something is left to look at; nothing is |
   | `:scanned` | the turn is over, whatever it showed |
   | `:scan_wanted` | a round waits for a scan that this robot has not made |
   | `:sighted` | the landmark is in the picture, or a round waits for a scan |
   | `:roamed` | it is at the next place to look around, or has roamed for long enough |
-  | `:deposed` | others follow a later leader, or nobody hears this one |
+  | `:deposed` | others follow a later leader, or no robot hears this one |
   | `:superseded` | a leader of a later epoch names this robot in its order |
   | `:round_open` | a round is under way |
-  | `:lost_stop`, `:lost_hold` | it has lost everybody, and this is what it does then (`Policy`) |
-  | `:company` | it hears somebody |
+  | `:lost_stop`, `:lost_hold` | it has lost all others, and this is what it does then (`Policy`) |
+  | `:company` | it hears another robot |
   | `:short`, `:enough` | there are too few robots to have a leader; not too few |
   """
 

@@ -1,6 +1,6 @@
 defmodule Missions.Patrol.Ages do
   @moduledoc false
-  # Records when each point was last seen, by whomever: `%{number => ms}`; a point that nobody has seen is not in it, and is a day old. Pure.
+  # Records when any robot last saw each point: `%{number => ms}`; an unseen point is not in it, and is a day old. Pure.
   alias Hal.Pose
 
   @day_ms 86_400_000

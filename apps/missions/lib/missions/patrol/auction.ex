@@ -1,10 +1,10 @@
 defmodule Missions.Patrol.Auction do
   @moduledoc false
-  # Decides who visits which point, by auction: an alternative to `Missions.Patrol.Motivation`. Pure.
+  # Decides which robot visits which point, by auction: an alternative to `Missions.Patrol.Motivation`. Pure.
   #
   # Each tick every robot holds the same sequential auction by itself, over what all have told: the points that are due and
-  # that nobody is at, and where the robots are that are free. A bid is the distance; the least one wins its point, then the
-  # least of those that are left. So nothing more is sent, and robots that know the same decide the same. Who has a
+  # unattended, and where the free robots are. A bid is the distance; the least one wins its point, then the
+  # least of those that are left. So nothing more is sent, and robots that know the same decide the same. A robot that has a
   # point keeps it as with motivations (`Missions.Patrol.Motivation.keep/5`), which also settles what two took at once because
   # they knew different things. Source: Gerkey and Matarić's taxonomy (2004), iterated single-task assignment, greedy.
   alias Missions.Patrol.Motivation

@@ -11,12 +11,12 @@ defmodule Missions.Patrol.Motivation do
   | sign | here | meaning |
   |---|---|---|
   | theta | 100 | the threshold |
-  | fast | 20 to 40 /s | impatience if nobody is at it; the nearer the robot, the faster, so that the nearest takes it |
+  | fast | 20 to 40 /s | impatience if no robot is at it; the nearer the robot, the faster, so that the nearest takes it |
   | slow | 2 /s | while a robot is at it that is heard |
   | tau | 5 s | a robot that is silent for longer is at nothing |
-  | phi | 30 s | nobody is waited for longer than this, heard or not |
+  | phi | 30 s | no robot is waited for longer than this, heard or not |
   | psi | 30 s | a robot that is at it for longer gives way to another that is |
-  | lambda | 60 s | and after this to nobody in particular |
+  | lambda | 60 s | and after this to none in particular |
 
   So a task of a robot that fell silent is taken over at most tau + theta/fast after its last word, if another robot is free
   (`takeover_ms/0`).
@@ -120,7 +120,7 @@ defmodule Missions.Patrol.Motivation do
     end
   end
 
-  # Who has taken a task that is done may reset it again when it takes the next one of this place.
+  # A robot that took a task that is done may reset it again when it takes the next one of this place.
   defp forget(motivation, tasks) do
     needed = for %{needed?: true, number: number} <- tasks, do: number
 

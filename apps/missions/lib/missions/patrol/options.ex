@@ -9,7 +9,7 @@ defmodule Missions.Patrol.Options do
   | `centre:` | where its middle is | `{0.0, 0.0}` |
   | `points:` | up to 64 points instead of a loop, `[{1, 2}, {3, 4}]` | none |
   | `period:` | within which each point is to be seen | 120.0 |
-  | `by:` | who visits which: `:motivation` (`Missions.Patrol.Motivation`), `:auction` (`Missions.Patrol.Auction`) | `:motivation` |
+  | `by:` | how points are shared: `:motivation` (`Missions.Patrol.Motivation`), `:auction` (`Missions.Patrol.Auction`) | `:motivation` |
   """
   alias Hal.Options
 

@@ -37,7 +37,7 @@ defmodule Robot.Behaviour.Arbiter do
   def weight(%Wish{weight: weight}, _last_by), do: weight
 
   @doc """
-  Who wished, with the weights by which they are compared, the winner first.
+  The sources of the wishes, with the weights by which they are compared, the winner first.
 
       iex> wish = fn by, weight -> Robot.Wish.new(by, Hal.Twist.zero(), weight) end
       iex> Robot.Behaviour.Arbiter.weights([nil, wish.(:rest, 0.1), wish.(:goto, 0.5)], nil)

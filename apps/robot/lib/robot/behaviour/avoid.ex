@@ -12,7 +12,7 @@ defmodule Robot.Behaviour.Avoid do
   `by: :blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
 
   Options: `inner`, the behaviour (required); `discs`, further standing obstacles,
-  `[{x, y, radius}]` in the map frame, metres; `unmapped`, that the robot is where walls are that nobody has told of
+  `[{x, y, radius}]` in the map frame, metres; `unmapped`, that the robot is where unreported walls are
   (`.Caution`).
   """
   @behaviour Robot.Behaviour

@@ -238,7 +238,7 @@ defmodule Robot.Control.Controller do
     do: {percept, %{controller | percept: percept}}
 
   defp locate(controller, percept) do
-    # What its sonars have seen follows from its pose, and cannot correct it, but it tells whom walls hide.
+    # What its sonars have seen follows from its pose, and cannot correct it, but it tells which robots walls hide.
     given = %{percept | grid: walls(controller)}
     {percept, localiser} = Localiser.update(controller.localiser, given)
     plan? = Localiser.by_walls?(localiser)

@@ -8,7 +8,7 @@ defmodule Robot.Control.Crash do
   alias Robot.Board
 
   @most 160
-  # Whose lines say nothing to people who look for the mistake.
+  # Lines of these apps do not help a person find the mistake.
   @theirs [:kernel, :stdlib, :elixir, :erts, :compiler]
 
   @doc "Calls a function of the mission (`:pilot`) or of a behaviour (`:executive`); if it fails, tells so, and fails as it did."

@@ -4,7 +4,7 @@ defmodule Robot.Control.Pilot do
   executive, messages to others, stages to people. What it does is on the board under `:mission`.
 
   It starts idle, and resets the executive: after a crash of the mission the robot stands until
-  somebody starts a mission again.
+  a person starts a mission again.
 
   A mission does not handle stops. The pilot ends the mission, whatever its phase, and passes the
   stop to the executive, which drops its goal, and from there to the gate, after every older wish.

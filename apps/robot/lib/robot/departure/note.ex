@@ -3,7 +3,7 @@ defmodule Robot.Departure.Note do
   Keeps the file that remembers that a robot has left its start pose (`Robot.Departure`).
 
   It holds the boot of the machine and the odometry frame whose zero is the start pose. A file of an earlier boot does
-  not count: whoever boots the machine puts the robot at its start pose. So does who starts the robot by hand, and who
+  not count: a person who boots the machine puts the robot at its start pose. So does one who starts the robot by hand, or
   stops its service (`Swarm.Host.DepartureFile`): then the file is deleted.
 
   What cannot be read counts as left.

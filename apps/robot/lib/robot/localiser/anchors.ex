@@ -3,7 +3,7 @@ defmodule Robot.Localiser.Anchors do
   Holds the references by which the localiser corrects the pose, as a mission gives them: the frame, and
   the places of known objects. Pure data and functions on it.
 
-  The frame is that of the leader, whose pose nobody corrects: its own estimate defines the frame.
+  The frame is that of the leader, whose pose is not corrected: its own estimate defines the frame.
   Its uncertainty is therefore part of the uncertainty of every robot in its frame. A robot that
   joins the frame takes over the uncertainty of the leader's pose in the frame that the leader was
   in before (`base`), and from then on what the leader's odometry adds.
@@ -223,7 +223,7 @@ defmodule Robot.Localiser.Anchors do
 
   @typedoc """
   `standing` is the colour of the one object that a robot in its own frame may take for standing
-  still at a place that nobody knows (`Robot.Localiser.TurnCheck`).
+  still at an unknown place (`Robot.Localiser.TurnCheck`).
   """
   @type t :: %__MODULE__{
           frame: frame() | nil,

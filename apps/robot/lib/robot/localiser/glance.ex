@@ -4,7 +4,7 @@ defmodule Robot.Localiser.Glance do
 
   In a large fleet most robots stand beside the picture or behind the camera. What a picture says of one depends on its
   direction and on how uncertain that is, whose exact value takes two products with a covariance matrix. The bound takes
-  the greatest standard deviations of both places instead (Cauchy and Schwarz), so that nobody is passed over whom the
+  the greatest standard deviations of both places instead (Cauchy and Schwarz), so that no robot is passed over that the
   exact value would let through.
   """
   alias Hal.Pose

@@ -3,8 +3,8 @@ defmodule Robot.Mission.Claim do
   Describes what a mission says of itself to all other robots, five times a second, with their heartbeats. Pure.
 
   A mission names a struct for it (`c:Robot.Mission.claims/0`); the fields' values come from its
-  effect `{:claim, map}`, or are the struct's defaults. Who runs the same version of the same mission hears them; everybody else
-  hears the robot's body alone.
+  effect `{:claim, map}`, or are the struct's defaults. Robots with the same version of the mission hear them; all others
+  hear the robot's body alone.
   """
   alias Robot.Mission
 
@@ -100,7 +100,7 @@ defmodule Robot.Mission.Claim do
       else: claim
   end
 
-  # A mission from outside is not loaded for that: whoever invents names would keep the code server busy.
+  # A mission from outside is not loaded for that: a sender of invented names would keep the code server busy.
   defp loaded?(nil), do: false
   defp loaded?(mission), do: Code.ensure_loaded?(mission)
 

@@ -9,7 +9,7 @@ defmodule Robot.Mission.Manual do
 
   Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
   (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why; from a door, or
-  where nobody gets past it, it goes aside (`Robot.Navigation.PassingPlace`). One that ends
+  where no robot gets past it, it goes aside (`Robot.Navigation.PassingPlace`). One that ends
   where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
@@ -123,7 +123,7 @@ defmodule Robot.Mission.Manual do
 
   defp result(mission, effects), do: {:done, mission, effects}
 
-  # It does not stay in a door, or in another place where nobody gets past.
+  # It does not stay in a door, or in another place where no robot gets past.
   defp aside(%{grid: nil}, _goal, _count), do: []
 
   defp aside(%{grid: grid, pose: pose, profile: %{radius: radius}}, goal, count) do
@@ -161,7 +161,7 @@ defmodule Robot.Mission.Manual do
   defp goal({:move, linear, turn}, _percept),
     do: {Robot.Behaviour.Move, linear: linear, turn: turn}
 
-  # What somebody who steers says again and again: it ends by itself when the words do.
+  # A person who steers repeats this command: it ends by itself when the repetitions do.
   defp goal({:move, linear, turn, for_s}, _percept),
     do: {Robot.Behaviour.Move, linear: linear, turn: turn, for_ms: for_s * 1_000}
 

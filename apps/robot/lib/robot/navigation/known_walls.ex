@@ -3,7 +3,7 @@ defmodule Robot.Navigation.KnownWalls do
   Holds what a robot knows of walls, by a floor plan, by its sonars, or by both. Pure.
 
   With a floor plan the robot also remembers what its sonars surely see where the plan shows free space: a door that is
-  shut, furniture that nobody drew (`Robot.Navigation.OccupancyGrid`). Its ways lead round that as round walls, but it
+  shut, furniture that is not drawn (`Robot.Navigation.OccupancyGrid`). Its ways lead round that as round walls, but it
   proves nothing: it may be gone, and is forgotten in time. So `known/1` is the plan alone, for all that reasons by
   walls, and `ways/1` the plan with what was seen, for ways. The plan is one term, which the robots of a node share; a
   copy with what was seen is made only when that changes, at most once a second.

@@ -122,7 +122,7 @@ defmodule Robot.Recording.Drawing do
     Json.encode!({:object, pan: pan, blobs: blobs})
   end
 
-  @doc "Who sent a message of this kind to whom, for `Hal.Json`."
+  @doc "Sender, receiver and kind of a message, for `Hal.Json`."
   @spec message(from :: atom() | String.t(), to :: term(), kind :: atom()) :: Json.value()
   def message(from, to, kind),
     do: {:object, from: from, to: List.wrap(to), kind: kind || "?"}

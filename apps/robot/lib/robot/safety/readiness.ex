@@ -2,7 +2,7 @@ defmodule Robot.Safety.Readiness do
   @moduledoc """
   Decides whether an order that can move a robot would be carried out now, and whether a stop
   reaches its wheels, by the drive's entries on the board. An order is for now: it must not begin
-  to move the robot later, when it is armed, whoever arms it: a person, or, with `arm: :auto`, the
+  to move the robot later, when it is armed, no matter by what: a person, or, with `arm: :auto`, the
   drive itself. In a dry run nothing moves, and every order is accepted.
   """
   alias Hal.Device.Words

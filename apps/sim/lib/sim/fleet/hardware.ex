@@ -102,7 +102,7 @@ defmodule Sim.Fleet.Hardware do
     ]
   end
 
-  # The field of view of the pictures is that of the profile as long as nobody zooms.
+  # The field of view of the pictures is that of the profile as long as the camera does not zoom.
   defp lens(%{camera: %{field_of_view: wide}}), do: {wide / 11, wide}
 
   defp base_link(folder, %{id: id}), do: Path.join(folder, "#{id}.base")

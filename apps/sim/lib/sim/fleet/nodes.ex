@@ -3,7 +3,7 @@ defmodule Sim.Fleet.Nodes do
   Runs world and robots, each in a process of the operating system of its own (`Sim.Node`), on loopback; this one, the
   launcher, starts them and listens to them.
 
-  A robot whose process ends, whoever killed it, is dead. One that sends nothing, perhaps because
+  A robot whose process ends, for any reason, is dead. One that sends nothing, perhaps because
   it is frozen, is `:silent` until it sends again. When the world's process ends, it is started
   again from its last snapshot, and the robots, which stood meanwhile, go on;
   when it ends for the sixth time, so does the run.

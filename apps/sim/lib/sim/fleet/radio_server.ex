@@ -108,7 +108,7 @@ defmodule Sim.Fleet.RadioServer do
   end
 
   # One by one: what one robot misses, another may hear. Its first heartbeats tell where a robot
-  # is; until then messages to it go to everybody.
+  # is; until then messages to it go to all robots.
   defp deliver(to, %{kind: kind} = message) do
     cond do
       Names.whereis(to, :comms) -> Comms.hear(to, message)

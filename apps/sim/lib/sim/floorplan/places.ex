@@ -1,6 +1,6 @@
 defmodule Sim.Floorplan.Places do
   @moduledoc """
-  Chooses where the landmark and the robots of a run stand, if nobody says it. Pure.
+  Chooses where the landmark and the robots of a run stand, if that is not given. Pure.
 
   The landmark stands in the middle of the map, if the fleet has room about it. If not, in the room
   nearest the middle that takes the whole fleet; else where the fleet has room in several rooms, by

@@ -30,8 +30,8 @@ defmodule Sim.Recording.Facts do
   end
 
   @typedoc """
-  What a tick's entries say to viewers: who sent what (and where it believed to be, in a heartbeat),
-  at what speed each drives, and what each camera saw.
+  What a tick's entries say to viewers: each message and its sender (in a heartbeat with its believed place), at
+  what speed each drives, and what each camera saw.
   """
   @type t :: %{
           sent: [{atom(), to :: term(), kind :: atom() | nil, Pose.t() | nil}],

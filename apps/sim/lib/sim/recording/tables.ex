@@ -6,13 +6,13 @@ defmodule Sim.Recording.Tables do
   |---|---|
   | `poses` | each robot each 100 ms: where it is, in metres and radians, and its phase |
   | `errors` | each robot with a place in a formation: how far from it, and how sure of its pose it says it is |
-  | `ticks` | each 100 ms: who leads, and the formation's error |
-  | `messages` | each message: who sent it to whom |
+  | `ticks` | each 100 ms: the leader, and the formation's error |
+  | `messages` | each message: its sender and its receiver |
   | `events` | what happened to the fleet |
 
   Of robots of processes `poses` are those that they believe, `alive` says whether something was recorded of the robot in
-  the second before, and `messages` has those of the missions, without heartbeats. Nobody knows their places in the formation nor
-  its error: these columns are empty.
+  the second before, and `messages` has those of the missions, without heartbeats. Their places in the formation
+  and its error are unknown: these columns are empty.
   """
   alias Sim.Recording.Facts
   alias Sim.Scene
@@ -56,7 +56,7 @@ defmodule Sim.Recording.Tables do
     row([at_s, robot.id, robot.alive, robot.state, x, y, heading, linear, turn])
   end
 
-  # Of robots of processes nobody knows the truth, nor a map.
+  # Of robots of processes neither the truth nor a map is known.
   defp believed?(scene), do: scene.map == nil
 
   defp error(at_s, robot) do

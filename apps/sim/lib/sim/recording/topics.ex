@@ -11,7 +11,7 @@ defmodule Sim.Recording.Topics do
   | `/paths` | the way that each robot went, every 5 s | `foxglove.SceneUpdate` |
   | `/log` | what happened to the fleet, as it happens | `foxglove.Log` |
   | `/mission` | numbers of the formation, 2 Hz | plain JSON |
-  | `/messages` | who sent what to whom | plain JSON |
+  | `/messages` | each message with its sender and receiver | plain JSON |
   | `/ROBOT/pose` | where the robot told others that it is, 2 Hz | `foxglove.PoseInFrame` |
   | `/ROBOT/state` | its phase, speed, error and doubt, 2 Hz | plain JSON |
   | `/ROBOT/blobs` | what its camera saw, 2 Hz | plain JSON |

@@ -35,7 +35,7 @@ defmodule Sim.Trial.AgreementMetrics do
         }
 
   @doc """
-  One tick: the claims of the living robots, each with its `role` (`t:Robot.Mission.role/0`), who leads in which part
+  One tick: the claims of the living robots, each with its `role` (`t:Robot.Mission.role/0`), the leaders of each part
   (`Sim.Trial.RunLog.leaders/2`), and the robots that stand because the mission says so.
   """
   @spec note(t(), integer(), [{atom(), map()}], [{part, leaders}], [atom()]) :: t()

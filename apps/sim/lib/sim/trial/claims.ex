@@ -5,7 +5,7 @@ defmodule Sim.Trial.Claims do
 
   A claim belongs to one leader, and lasts from when it says `formed` until it no longer does. A
   claim that is withdrawn within the 5 s, for example because the landmark moves, is judged by its
-  beginning alone; so is one during which the run ends. A leader that nobody follows claims
+  beginning alone; so is one during which the run ends. A leader without followers claims
   nothing about others, so there is no error to judge.
   """
 
@@ -74,7 +74,7 @@ defmodule Sim.Trial.Claims do
 
   @doc """
   Whether a claim was true: the error was at most half a metre when it was made, and 5 s later.
-  `nil` if nobody followed.
+  `nil` if no robot followed.
 
       iex> Sim.Trial.Claims.right?(%{worst_m: 0.2, worst_5s_m: 0.6})
       false

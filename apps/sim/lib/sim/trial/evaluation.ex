@@ -101,7 +101,7 @@ defmodule Sim.Trial.Evaluation do
 
   @doc """
   How far the worst living robot of a leader's shape is from its slot, in metres; `nil` if it
-  leads nobody.
+  leads none.
   """
   @spec worst(run(), leader :: atom()) :: float() | nil
   def worst(run, leader) do
@@ -124,7 +124,7 @@ defmodule Sim.Trial.Evaluation do
     end
   end
 
-  # It claims neither to be in place, nor to be blocked, nor to be unsure of its place, and nobody has stopped it.
+  # It claims neither to be in place, nor to be blocked, nor to be unsure of its place, and it has not been stopped.
   defp under_way?(log, claim), do: log.roles[RunLog.account(log, claim).state] == :follows
 
   defp row(robot, slot, claim) do

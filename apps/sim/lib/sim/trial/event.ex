@@ -20,7 +20,7 @@ defmodule Sim.Trial.Event do
   | `{:blind, robot, for_s}` | its camera gives no pictures |
   | `{:deaf, robot, for_s}` | it receives no messages |
 
-  A robot is its name or `:leader`, who leads at that time; `:tell` also takes `:all`.
+  A robot is its name or `:leader`, the one that leads at that time; `:tell` also takes `:all`.
   """
   alias Hal.Options.{Suggest, Type, Wording}
   alias Robot.Command

@@ -55,7 +55,7 @@ defmodule Sim.Trial.Mechanics do
     }
   end
 
-  @doc "Puts into effect who is cut off, and whose wheels stand, from now on."
+  @doc "Puts into effect which robots are cut off, and whose wheels stand, from now on."
   @spec settle(trial()) :: trial()
   def settle(trial), do: trial |> impair() |> cut()
 

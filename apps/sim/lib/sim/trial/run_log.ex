@@ -165,7 +165,7 @@ defmodule Sim.Trial.RunLog do
   def role(run_log, claim), do: run_log.roles[claim[:phase]]
 
   @doc """
-  Who leads in which part of the radio, by claims that each have their `role`: all that speaks of two leaders at once asks
+  The leaders of each part of the radio, by claims that each have their `role`: all that speaks of two leaders at once asks
   this. Parts that cannot reach each other each have their own leader.
 
       iex> claims = [mag1: %{role: :leads}, mag2: %{role: :leads}, mag3: %{role: :follows}]

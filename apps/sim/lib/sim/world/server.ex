@@ -115,7 +115,7 @@ defmodule Sim.World.Server do
     Process.flag(:priority, :high)
     :ok = World.Directory.enter(name, self())
     ticker = Ticker.start(:step, @step_ms, @step_ms)
-    # Nobody is at the wheels yet, whatever a world that goes on was told last.
+    # No robot drives its wheels yet, whatever a world that goes on was told last.
     world = Enum.reduce(world.order, world, &stand(&2, &1))
     {:ok, %__MODULE__{name: name, world: world, ticker: ticker}}
   end

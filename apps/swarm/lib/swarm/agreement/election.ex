@@ -8,14 +8,14 @@ defmodule Swarm.Agreement.Election do
   parts of a fleet have met, and the one with the highest {robots led, merit, name} leads all: the
   fewest have to turn to another.
 
-  Under the policy `:majority` (`of` is the fleet's size) nobody leads a view that is not more than
+  Under the policy `:majority` (`of` is the fleet's size) no robot leads a view that is not more than
   half of the fleet.
   """
 
   @typedoc """
   What a robot reported in a round; `nil` if it was silent until the deadline. `merit` says how well
   it would lead, in millionths, by the measure of its mission; `nil`: not at all. `led` is how many
-  robots it leads including itself, 0 if it leads nobody; `of` is the size of the fleet of which
+  robots it leads including itself, 0 if it leads none; `of` is the size of the fleet of which
   only a majority may lead, 0 under the policy `:available`.
   """
   @type report ::

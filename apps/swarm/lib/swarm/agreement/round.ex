@@ -260,7 +260,7 @@ defmodule Swarm.Agreement.Round do
   end
 
   # All reports in the letters of all to all would be the cube of a large group. Where reports are missing, each may have
-  # one that nobody else has.
+  # one that no other has.
   defp echoes?(%{phase: :echo}), do: true
   defp echoes?(round), do: round.me in Enum.take(round.view, @echoing)
 

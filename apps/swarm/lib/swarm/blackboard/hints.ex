@@ -23,7 +23,7 @@ defmodule Swarm.Blackboard.Hints do
   def put(board \\ @board, robot, key, value),
     do: write(board, robot, key, fn -> Codec.encode(key, value) end)
 
-  @doc "A robot deletes a hint, whoever wrote it."
+  @doc "A robot deletes a hint, its own or another's."
   @spec delete(atom(), atom(), Codec.key()) :: :ok | {:error, line :: String.t()}
   def delete(board \\ @board, robot, key), do: write(board, robot, key, fn -> "" end)
 

@@ -16,7 +16,7 @@ defmodule Swarm.Blackboard.Rows do
 
   @buckets 16
   @hashes 4_294_967_296
-  # Nobody writes this often in one life.
+  # No robot writes this often in one life.
   @leap 1_000_000_000_000
   @most 100_000_000_000_000
   # Times of day in ms, or, on finer clocks, in ns, until the year 2160.
@@ -56,7 +56,7 @@ defmodule Swarm.Blackboard.Rows do
   def of(state, bucket), do: :maps.filter(fn id, _held -> bucket(id) == bucket end, state.hints)
 
   @doc """
-  Whether a sequence is farther ahead of the known one than anybody gets, or near the end of its
+  Whether a sequence is farther ahead of the known one than any robot gets, or near the end of its
   range: accepting it would leave no room for later writes.
   """
   @spec leap?(sequence :: integer(), known :: integer()) :: boolean()
@@ -65,7 +65,7 @@ defmodule Swarm.Blackboard.Rows do
   @doc """
   Whether an incarnation can be that of a robot whose last known one is this (`nil`: none is
   known). Above all times of day there is a range for those that outbid wrong numbers, in which
-  they count by ones, so nobody can bring them to its end.
+  they count by ones, so nothing can bring them to its end.
 
       iex> latest = 6_000_000_000_000_000_000
       iex> for {n, known} <- [{latest, 1}, {latest + 1, latest}, {latest + 1, nil}, {latest + 1, 1}],

@@ -269,7 +269,7 @@ defmodule Swarm.Blackboard.Server do
 
   defp schedule(%{repair_ms: :never} = s), do: s
 
-  # So that not all nodes send at the same time. One timer, however often somebody asks.
+  # So that not all nodes send at the same time. One timer, however often it is asked for.
   defp schedule(s) do
     if s.timer, do: Process.cancel_timer(s.timer)
     {part, rand} = :rand.uniform_s(s.rand)

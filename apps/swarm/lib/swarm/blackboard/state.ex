@@ -179,7 +179,7 @@ defmodule Swarm.Blackboard.State do
     end
   end
 
-  # A count that nobody can have reached would leave no room for later ones.
+  # A count that no robot can have reached would leave no room for later ones.
   defp count_on(%{clock: clock} = rows, count, _now_ms) when count <= clock, do: {:ok, rows}
 
   defp count_on(%{clock: clock, guard: guard} = rows, count, now_ms) do

@@ -125,7 +125,7 @@ defmodule Swarm.Commands.Client do
   defp refusal(id, {:error, reason}), do: "#{id} refuses: #{inspect(reason)}"
 
   # The nearest process that takes the request. If its node is not connected, or not heard, the
-  # way through other nodes comes first, `{:relay, process or nil}`; `nil` if nobody knows the
+  # way through other nodes comes first, `{:relay, process or nil}`; `nil` if no node knows the
   # robot.
   defp whereabouts(id, request) do
     pid = if(EStop.takes?(request), do: nearest({:estop, id})) || Directory.whereis(id)

@@ -20,7 +20,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   While the emergency stop holds a robot, it refuses to be armed and all commands that would move
   it. The latter are also refused, with the reason, while its drive is offline or not armed
-  (`Robot.Safety.Readiness`); otherwise the motion would begin later, when somebody arms it. A `goto` to a place that the
+  (`Robot.Safety.Readiness`); otherwise the motion would begin later, when it is armed. A `goto` to a place that the
   robot cannot reach by what it knows of walls is refused, too (`Robot.Navigation.Reach`).
   """
   alias Hal.{Device, Pose}
@@ -160,7 +160,7 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 
-  # People use `Swarm`, which has checked everything; but anybody may send something here.
+  # People use `Swarm`, which has checked everything; but any process may send something here.
   defp checked({:start, options}, config) do
     with {:ok, {:start, options}} <- Order.check({:start, options}),
          {:ok, {module, _defaults}} <- mission(config),

@@ -3,11 +3,11 @@ defmodule Swarm.Comms.NameClaim do
   # Settles a robot's claim to its name, with the effects of its comms (`t:Robot.Role.effect/0`). Of two robots with the same
   # name, on any nodes, the one with the
   # lower `{boot, node}` stays. The other leaves the directory and gives way, until the first has
-  # been neither heard nor found in the directory for 10 s: perhaps it never existed, and somebody
-  # only said so. Pure.
+  # been neither heard nor found in the directory for 10 s: perhaps it never existed, and a message
+  # only claimed so. Pure.
   #
   # They find each other in the directory, where both comms processes are in the same group and tell
-  # each other who they are once a second, or through the mesh, where each hears heartbeats that are
+  # each other their identities once a second, or through the mesh, where each hears heartbeats that are
   # not its own.
   alias Mesh.Nonblocking
   alias Robot.Role
@@ -59,7 +59,7 @@ defmodule Swarm.Comms.NameClaim do
   end
 
   @doc """
-  Tells all others of the same name who this robot is, or takes the name back if no other robot has it any more. Called once
+  Tells all others of the same name its identity, or takes the name back if no other robot has it any more. Called once
   a second; `taken?` says whether the directory knows another.
   """
   @spec look(t(), taken? :: boolean(), now_ms :: integer()) :: {t(), [Role.effect()]}

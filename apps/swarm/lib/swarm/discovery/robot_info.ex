@@ -1,6 +1,6 @@
 defmodule Swarm.Discovery.RobotInfo do
   @moduledoc """
-  Describes a robot for those who search for one (`Swarm.find/1`): the row `{robot, :about}` of
+  Describes a robot for searches (`Swarm.find/1`): the row `{robot, :about}` of
   the blackboard, written by the robot's comms process once a second, and at once when its mission
   changes.
 

@@ -11,7 +11,7 @@ defmodule Swarm.EStop.Answer do
 
   @doc """
   Called by the gate when the robot's mission or order has ended and the gate has stopped: answers whether the wheels
-  were told, which their next report shows. Waits for nobody.
+  were told, which their next report shows. Does not wait.
   """
   @spec stood(atom(), reference()) :: :ok
   def stood(robot, ref), do: confirm(robot, {Nonblocking, :answer, [ref]})
@@ -39,7 +39,7 @@ defmodule Swarm.EStop.Answer do
     Nonblocking.answer(ref, {:error, "#{robot} is held, but #{why}"})
   end
 
-  @doc "Answers an e-stop that took too long; nobody hears it after another answer."
+  @doc "Answers an e-stop that took too long; after another answer it has no effect."
   @spec unsaved(atom(), reference()) :: :ok
   def unsaved(robot, ref) do
     board = Board.find!(robot)

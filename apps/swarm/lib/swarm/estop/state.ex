@@ -3,10 +3,10 @@ defmodule Swarm.EStop.State do
   Models the spreading and clearing of an emergency stop, as a function. Pure.
 
   Each stop has a tag, made from its call (`tag/1`). A robot is held by a set of stops. Every heartbeat carries the tags
-  of those that hold its robot, and whoever hears a tag that no person has cleared here is held by that stop, too. A
-  reset clears all that hold the robot. So a stop reaches every robot that is connected with one that it holds, whoever
+  of those that hold its robot, and a robot that hears a tag that no person has cleared here is held by that stop, too. A
+  reset clears all that hold the robot. So a stop reaches every robot that is connected with one that it holds, also one that
   was cut off or has started again before; and a robot that a person has reset is not stopped again by a neighbour that
-  nobody has reset yet.
+  no person has reset yet.
 
   Whatever one hears, nothing grows: at most 16 stops hold a robot at a time, and the last 256 that were cleared are
   remembered. No stop is refused: a robot that is held by so many is held.
@@ -65,7 +65,7 @@ defmodule Swarm.EStop.State do
   def tag(call), do: :erlang.phash2(call, StopTags.count())
 
   @doc """
-  Somebody stops the fleet here; the call, which is sent to the others, is remembered.
+  A person stops the fleet here; the call, which is sent to the others, is remembered.
 
       iex> call = {:base@hall, 1_700_000_000_000, 1}
       iex> Swarm.EStop.State.press(Swarm.EStop.State.new(), call).held == [Swarm.EStop.State.tag(call)]

@@ -20,7 +20,7 @@ defmodule Swarm.Formation.Ladder do
   @rungs [:asked, :turned, :closer, :column, :cluster]
   @turns for k <- 1..12, sign <- [1, -1], k != 12 or sign == 1, do: sign * k * :math.pi() / 12
   @closer 0.1
-  # The half of the angle in which nobody may stand before the leader, and how far beyond what it faces.
+  # The half of the angle in which no robot may stand before the leader, and how far beyond what it faces.
   @ahead 0.5
   @beyond 0.4
   # Places are looked for along a trail in steps of this share of the spacing, and up to this many.

@@ -11,7 +11,7 @@ defmodule Swarm.Host.DepartureFile do
   alias Swarm.Host.ReleaseBoot
 
   @doc """
-  The path, and who starts the robot; `nil` outside a release.
+  The path, and what starts the robot; `nil` outside a release.
 
       iex> Swarm.Host.DepartureFile.of(:mag1, %{"RELEASE_TMP" => "/run/convoy", "NOTIFY_SOCKET" => "/run/n"})
       {"/run/convoy/mag1.departed", :service}

@@ -6,8 +6,8 @@ defmodule Swarm.Host.PowerOff do
 
   While a robot runs here, it holds the line of its base, and the power stays on: a machine that
   still drives has not halted. The power also stays on if the line cannot be checked, for instance
-  without permission. A base on another line than its own file says is not noticed. Nobody can
-  know whether a controller listens to the console, so the answer says only that the phrase was
+  without permission. A base on another line than its own file says is not noticed. It cannot be
+  known whether a controller listens to the console, so the answer says only that the phrase was
   sent.
   """
   alias Hal.RFlex.PowerSwitch

@@ -29,9 +29,9 @@ defmodule Swarm.Membership.Peers do
   """
   @type row :: %{beat: Heartbeat.t(), at_ms: integer(), direct_ms: integer() | nil}
   @typedoc """
-  `changes` counts those who came, came back or restarted, up to the last heartbeat. `shown` has all as a percept shows
-  them while nobody is gone, which nobody can be for whom less than that has passed since `oldest_ms`, the time before
-  which no row is from; it was looked for at `looked_ms`.
+  `changes` counts the robots that came, came back or restarted, up to the last heartbeat. `shown` has all as a percept
+  shows them while none is gone. No row is older than `oldest_ms`, found at `looked_ms`: less than 2 s after that
+  none can be gone.
   """
   @type t :: %__MODULE__{
           me: atom(),

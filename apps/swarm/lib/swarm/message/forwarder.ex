@@ -15,7 +15,7 @@ defmodule Swarm.Message.Forwarder do
   alias Swarm.Message
   alias Swarm.Membership.{Heartbeat, NameSet}
 
-  # A robot that has just joined is not in anybody's list yet.
+  # A robot that has just joined is not in any list yet.
   @patience_ms 300
   # Letters of rounds are repeated every 100 ms; the same letter arrives more often by several ways.
   @repeat_ms 90
@@ -170,7 +170,7 @@ defmodule Swarm.Message.Forwarder do
           NameSet.member?(peer.beat.heard, from) and NameSet.member?(peers[to].beat.heard, id)
       end)
 
-    # Not all ways are looked for: in a large group nearly everybody is one.
+    # Not all ways are looked for: in a large group nearly every robot is one.
     if heard?(peers[from], now_ms),
       do: Enum.count(Stream.take(Stream.filter(ways, &(elem(&1, 0) < me)), @relays)) < @relays,
       else: Enum.empty?(ways) and is_map_key(peers, from)

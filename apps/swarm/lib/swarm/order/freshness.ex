@@ -30,7 +30,7 @@ defmodule Swarm.Order.Freshness do
   # How long the sender of an order waits for an answer (`Swarm.Commands.Client`).
   @longest_us 500_000
   # Allowed for the way back of a stamp. A person who stops a robot and then starts it must not be
-  # refused because that way was slow once; and nobody can tell the order of two actions of people
+  # refused because that way was slow once; and no robot can tell the order of two actions of people
   # on two machines within this time.
   @way_back_us 50_000
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Replacement.Admission do
   @moduledoc false
-  # Decides whether an order is carried out: by whom it is signed, and for when; whether its robots allow it now; whether its code may
+  # Decides whether an order is carried out: by its signer and time; whether its robots allow it now; whether its code may
   # come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
   alias Swarm.Replacement
   alias Robot.Names
@@ -68,7 +68,7 @@ defmodule Swarm.Replacement.Admission do
          do: {:ok, robots, module, modules, earlier}
   end
 
-  @doc "Whether it must not be disturbed. What nobody has started yet gives way."
+  @doc "Whether it must not be disturbed. What has not been started yet gives way."
   @spec busy?(job()) :: boolean()
   def busy?(%{job: %{phase: phase}}), do: phase != :waiting
 
@@ -98,7 +98,7 @@ defmodule Swarm.Replacement.Admission do
     end
   end
 
-  # Code is the node's: who runs it now, and is not meant, would go on with a state that the new code does not know.
+  # Code is the node's: a robot that runs it but is not meant would go on with a state that the new code does not know.
   defp alone(names, robots, busy) do
     others =
       for id <- Names.robots() -- robots, {module, _} <- [Entries.running(id)], do: {id, module}

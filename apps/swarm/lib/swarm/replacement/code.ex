@@ -9,7 +9,7 @@ defmodule Swarm.Replacement.Code do
   alias Swarm.Missions
   alias Swarm.Replacement.{ObjectCode, Order}
 
-  # What carries the robot, even if somebody configures a mission of it.
+  # What carries the robot, even if a mission of it is configured.
   @carrying [:hal, :vision, :robot, :mesh, :swarm]
 
   @typedoc "What was loaded before: object code, or nothing."
@@ -88,7 +88,7 @@ defmodule Swarm.Replacement.Code do
 
   defp mission?({name, beam}), do: ObjectCode.read(name, beam) == {:ok, true}
 
-  @doc "The object code of all modules that may be replaced, from their files, before anybody changes these."
+  @doc "The object code of all modules that may be replaced, from their files, before these change."
   @spec keep() :: store()
   def keep do
     for app <- apps(),
@@ -100,7 +100,7 @@ defmodule Swarm.Replacement.Code do
 
   defp apps, do: Missions.apps() -- @carrying
 
-  @doc "Loads the missions' modules again from their files where other code is loaded; nobody knows what was kept."
+  @doc "Loads the missions' modules again from their files where other code is loaded; what was kept is not known."
   @spec revert() :: :ok
   def revert do
     for {module, beam} <- keep(), :erlang.module_loaded(module), same(module, beam) != beam do

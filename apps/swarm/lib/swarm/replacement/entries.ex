@@ -69,7 +69,7 @@ defmodule Swarm.Replacement.Entries do
          else: (:error -> nil)
   end
 
-  @doc "Notes that its own mission is back because nobody knows what came in its place."
+  @doc "Notes that its own mission is back because what came in its place is not known."
   @spec forget(atom(), why :: String.t()) :: :ok
   def forget(robot, why) do
     _put =

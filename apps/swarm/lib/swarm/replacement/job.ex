@@ -117,13 +117,13 @@ defmodule Swarm.Replacement.Job do
     end
   end
 
-  # Nobody has started it, so all still stand.
+  # It has not been started, so all still stand.
   def step(%{phase: :trying} = job, {:tried, {:error, line}}, _now_ms),
     do: resume(job, line, [:restore])
 
   def step(%{phase: :watching} = job, {:started, _id, :ok}, _now_ms), do: {job, []}
 
-  # Who has not begun in time, or lacks the mission, could not say why.
+  # A robot that has not begun in time, or lacks the mission, could not say why.
   def step(%{phase: :watching} = job, {:started, id, {:error, why}}, now_ms)
       when why in [:late, :no_mission, :idle],
       do: return(job, "#{id} could not start it", now_ms)

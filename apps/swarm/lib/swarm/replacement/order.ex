@@ -2,7 +2,7 @@ defmodule Swarm.Replacement.Order do
   @moduledoc false
   # Encodes the order that replaces a mission, as bytes, with its signature. Pure.
   #
-  # Its content is the same for all robots that it is meant for: an identity, who gave it, to whom, the mission with its
+  # Its content is the same for all robots that it is meant for: an identity, its sender, its receivers, the mission with its
   # options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
   # byte of it becomes an atom before the signature was checked, and names of options only after the code that
   # knows them was loaded.

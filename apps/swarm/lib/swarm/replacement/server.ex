@@ -1,7 +1,7 @@
 defmodule Swarm.Replacement.Server do
   @moduledoc false
   # Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
-  # the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nobody watches any more,
+  # the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nothing watches any more,
   # its successor brings back the release.
   use GenServer
   alias Swarm.Replacement
@@ -67,7 +67,7 @@ defmodule Swarm.Replacement.Server do
     {:ok, s, {:continue, :forget}}
   end
 
-  # A predecessor may have left missions, and code, that nobody watches any more.
+  # A predecessor may have left missions, and code, that nothing watches any more.
   @impl GenServer
   def handle_continue(:forget, s) do
     left = Enum.filter(Names.robots(), &Entries.noted/1)
@@ -110,7 +110,7 @@ defmodule Swarm.Replacement.Server do
     {:noreply, s}
   end
 
-  # Also of jobs that are over: who was slow has no fault.
+  # Also of jobs that are over: a slow robot has no fault.
   def handle_cast({:stood, id, robot}, s), do: {:noreply, step(s, id, {:stood, robot})}
 
   def handle_cast({:started, id, robot, result}, s),

@@ -4,7 +4,7 @@ defmodule Swarm.Status.Frame do
   other. Pure.
 
   `within` is `:start`, the frame of the start poses, in which each robot begins, or `{robot, number}`: one that this robot
-  defined when it led. `own` is the number of the frame that this robot itself defines now for those who follow it: its
+  defined when it led. `own` is the number of the frame that this robot itself defines now for its followers: its
   own pose is in it as well. `start` (metres) is where it was switched on, by its file.
   """
   alias Hal.Pose

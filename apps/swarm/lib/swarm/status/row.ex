@@ -30,7 +30,7 @@ defmodule Swarm.Status.Row do
       power: status.power,
       offline: texts(for {device, {:offline, _reason}} <- status.health, do: device),
       view: {number, texts(members)},
-      # Nearly always nobody, while it may hear many.
+      # Nearly always none, while it may hear many.
       deaf_to: texts(members -- [status.robot | status.hears]),
       rejected: status.rejected |> Map.values() |> Enum.sum(),
       age_ms: status.age_ms

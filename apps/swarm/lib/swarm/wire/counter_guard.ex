@@ -1,7 +1,7 @@
 defmodule Swarm.Wire.CounterGuard do
   @moduledoc """
-  Bounds how far others may raise a number that everybody counts up, such as that of a leadership.
-  Whoever adopts any number that it hears is at the mercy of the first wrong one: it counts on
+  Bounds how far others may raise a number that all robots count up, such as that of a leadership.
+  A robot that adopts any number that it hears follows the first wrong one: it counts on
   from there, and nothing is left at the end of the range. Pure; times in milliseconds.
 
   A number is admitted if it is at most a million above what was known when the present second
@@ -10,7 +10,7 @@ defmodule Swarm.Wire.CounterGuard do
   robot that was just switched on, or a part that was cut off, is as far behind as it can get by
   itself.
 
-  What is beyond that is refused. A fleet that somebody has pushed is joined nevertheless: while
+  What is beyond that is refused. A fleet whose number was pushed is joined nevertheless: while
   a greater number is heard again and again, the limit approaches it (`approach/4`), and a number
   that several say can be trusted at once (`trust/2`).
   """

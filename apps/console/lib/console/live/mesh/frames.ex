@@ -65,7 +65,7 @@ defmodule Console.Live.Mesh.Frames do
     [Enum.reduce(joined, keys, &MapSet.union/2) | apart]
   end
 
-  # Who starts where another one does.
+  # The robots that start where another one does.
   defp twins(statuses) do
     starts = for %{robot: id, frame: %Frame{start: start}} <- statuses, do: {id, start}
 

@@ -31,7 +31,7 @@ defmodule Console.Live.Mesh.View do
           estop: Scene.estop() | nil
         }
 
-  @doc "Nobody was heard yet."
+  @doc "The view before any robot is heard."
   @spec new() :: t()
   def new, do: %__MODULE__{}
 
@@ -69,7 +69,7 @@ defmodule Console.Live.Mesh.View do
     Enum.reduce(lines, view, &tell(&1, &2, clock, at_ms))
   end
 
-  # Nobody is led by one that has gone.
+  # No robot is led by one that has gone.
   defp heard(status, true), do: %{status | state: :not_heard}
   defp heard(status, false), do: status
 

@@ -26,7 +26,7 @@ defmodule Mesh.Distribution.Access.Refusals do
     :ok
   end
 
-  @doc "How many were refused since the node was started, by reason; empty for a node that refuses nobody."
+  @doc "How many were refused since the node was started, by reason; empty for a node that refuses none."
   @spec counts() :: %{Distribution.Access.refusal() => non_neg_integer()}
   def counts do
     for why <- @reasons,
@@ -62,7 +62,7 @@ defmodule Mesh.Distribution.Access.Refusals do
 
   defp log(ip, why, before, now_ms) do
     :ets.insert(@table, {{:address, ip}, now_ms, 0})
-    # Whoever listens to the event, or a console that is stopped, must not keep others waiting.
+    # A handler of the event, or a console that is stopped, must not keep others waiting.
     _pid = spawn(fn -> say(:inet.ntoa(ip), why, before, now_ms) end)
     :ok
   end

@@ -1,6 +1,6 @@
 defmodule Mesh.Distribution.ConnectionLog.Address do
   @moduledoc false
-  # Finds who is at the other end of the connection that this process serves. The socket belongs to this process, or with
+  # Finds the other end of the connection that this process serves. The socket belongs to this process, or with
   # TLS to one that is linked to it through a few others of the same connection. Named processes belong to all connections
   # and are skipped.
   @hops 3

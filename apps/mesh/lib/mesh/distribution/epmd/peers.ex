@@ -35,7 +35,7 @@ defmodule Mesh.Distribution.Epmd.Peers do
 
   @doc """
   The port that a node of this name listens on; 0 means any, for shells (`rem-…`, `rpc-…`), which
-  nobody dials and which share the environment of a robot.
+  no node dials and which share the environment of a robot.
 
       iex> Mesh.Distribution.Epmd.Peers.own_port("mag1", %{"CONVOY_DIST_PORT" => "9400", "ROBOT" => "mag1"})
       9400

@@ -1,7 +1,7 @@
 defmodule Mesh.Protocol.Packet.Filter do
   @moduledoc false
   # Checks a datagram before it changes anything: whether it is new, signed, of the fleet and makes
-  # sense. Pure. Whether it was made now, and by whom it was sent, `Mesh.Protocol.Admission` checks.
+  # sense. Pure. Whether it was made now, and by which node it was sent, `Mesh.Protocol.Admission` checks.
   alias Mesh.Consumer
   alias Mesh.Protocol.{Beacon, Challenge, NodeTable, Packet, Roster, WireTerm}
   alias Mesh.Protocol.Packet.ReplayProtection

@@ -10,7 +10,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
   # never received is worthless 2 s later. And each counts once
   # (`Mesh.Protocol.Packet.SequenceWindow`). If nothing of a session was believed for longer than
   # datagrams are fresh, its window begins anew: whatever it keeps out is stale by now, and a number
-  # far too high, which somebody with the fleet's key invented, does not shut the session out for
+  # far too high, which an owner of the fleet's key invented, does not shut the session out for
   # good.
   #
   # A session that was followed by another is never accepted again. While a node is heard, no other
@@ -51,7 +51,7 @@ defmodule Mesh.Protocol.Packet.ReplayProtection do
 
   @doc """
   Judges a datagram of a known name. `echo` is the challenge that it answers, if it answers one.
-  A `:stranger`, and who sends what is `:stale`, should be challenged: of the first the session is
+  A `:stranger`, and the sender of what is `:stale`, should be challenged: of the first the session is
   not known, of the second perhaps the clock has changed.
 
       iex> alias Mesh.Protocol.Packet.ReplayProtection

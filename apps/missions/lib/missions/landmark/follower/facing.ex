@@ -53,7 +53,7 @@ defmodule Missions.Landmark.Follower.Facing do
 
   defp heading(pose, {x, y}), do: :math.atan2(y - pose.y, x - pose.x)
 
-  # Who does not know walls takes one robot for another.
+  # A robot that does not know walls takes one robot for another.
   defp visible(%{anchor: anchor, percept: %{grid: grid} = percept} = mission, leader) do
     ahead = for id <- Enum.take_while(anchor.order, &(&1 != mission.me)), do: percept.peers[id]
     robots = for %{pose: pose} <- ahead, do: Pose.point(pose)

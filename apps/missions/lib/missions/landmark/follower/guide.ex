@@ -4,7 +4,7 @@ defmodule Missions.Landmark.Follower.Guide do
   #
   # Of the robots ahead of it the one whose slot is nearest to its own, and which is sure of its place, turns so that it has it
   # in its camera's range, measures where it stands, and says so in its claim (`sees`). Robots look alike, so it says so only
-  # if the blob can be nobody else: all others know where they are, and are elsewhere, and one alone does not.
+  # if the blob can be no other: all others know where they are, and are elsewhere, and one alone does not.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, SlotPoses}
@@ -27,7 +27,7 @@ defmodule Missions.Landmark.Follower.Guide do
 
   defstruct ward: nil, at: nil, count: 0, picture_ms: nil
 
-  @typedoc "Whom it guides, and where it has seen it since how many pictures, the last of which is of `picture_ms`."
+  @typedoc "The robot it guides, and where it has seen it since how many pictures, the last of which is of `picture_ms`."
   @type t :: %__MODULE__{
           ward: atom() | nil,
           at: Pose.point() | nil,
@@ -137,7 +137,7 @@ defmodule Missions.Landmark.Follower.Guide do
 
   @doc """
   The slot of a follower with the heading from which it can see the robot that it guides, and what it finds its own place by;
-  `ahead` is where that is. As it is where it guides nobody, or its camera can be panned so far.
+  `ahead` is where that is. As it is where it guides none, or its camera can be panned so far.
   """
   @spec turned(t(), Landmark.State.t(), slot :: Pose.t(), ahead :: Pose.point()) :: Pose.t()
   def turned(%{ward: nil}, _mission, slot, _ahead), do: slot

@@ -22,7 +22,7 @@ defmodule Missions.Landmark.Follower.Progress do
   # To have come nearer, it must have gained more than it may be mistaken by, or a metre.
   @late_ms 15_000
   @most_gain 1.0
-  # A slot that has moved farther than this is another one. Whoever judges from outside takes a metre, from any place where
+  # A slot that has moved farther than this is another one. A judge from outside takes a metre, from any place where
   # the slot was, and this robot sees it move by what its pose is corrected by, too.
   @elsewhere 1.2
   @here 0.1
@@ -164,7 +164,7 @@ defmodule Missions.Landmark.Follower.Progress do
 
   defp walled?(_percept, _slot), do: false
 
-  # Something that the sonars see where this robot should stand, and that nobody has reported.
+  # Something that the sonars see where this robot should stand, and that no robot has reported.
   defp obstacle?(%{percept: percept, anchor: anchor}, slot) do
     robots = for {_id, peer} <- percept.peers, do: {peer.pose.x, peer.pose.y, peer.radius}
 

@@ -1,7 +1,7 @@
 defmodule Missions.Landmark.Leader.Announcement do
   @moduledoc false
   # Decides what a leader announces each tick (`Missions.Landmark.Reference`, the anchor): where it is
-  # supposed to be and how sure of that it is, the shape and who stands where. Pure; millimetres and
+  # supposed to be and how sure of that it is, the shape and the robot of each slot. Pure; millimetres and
   # milliradians.
   alias Missions.Landmark
   alias Missions.Landmark.{LandmarkTrack, Shape}

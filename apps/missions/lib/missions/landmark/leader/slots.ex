@@ -15,7 +15,7 @@ defmodule Missions.Landmark.Leader.Slots do
   @spec near() :: float()
   def near, do: @near
 
-  @doc "One tick: who has left and who has come, and a shape that there is room for."
+  @doc "One tick: which robots have left or come, and a shape that there is room for."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
   def update(mission) do
     case Loss.kept(mission, Rounds.view(mission)) do
@@ -39,7 +39,7 @@ defmodule Missions.Landmark.Leader.Slots do
   end
 
   # Those behind find their places by those ahead, so a robot without pictures, which may not know its own, goes to the end. It
-  # stays there when its pictures come back, so that nobody moves for nothing.
+  # stays there when its pictures come back, so that no robot moves for nothing.
   defp sighted_first(%{order: order} = mission) do
     beats = Landmark.State.beats(mission)
     {blind, sighted} = Enum.split_with(order, &match?(%{blind: true}, claim(beats[&1])))
@@ -63,7 +63,7 @@ defmodule Missions.Landmark.Leader.Slots do
 
   defp told(shape), do: {shape.formation, shape.room, shape.spots}
 
-  # If most places are where they were, whoever has lost one takes its new one, and nobody else moves.
+  # If most places are where they were, a robot that has lost one takes its new one, and no other moves.
   defp most?(%{spots: [_ | _] = new}, %{spots: [_ | _] = old}) when length(new) == length(old),
     do: 2 * Enum.count(Enum.zip(new, old), fn {a, b} -> a == b end) >= length(new)
 

@@ -11,7 +11,7 @@ defmodule Missions.Landmark.Lookout.Legs do
   @again 0.6
   # One so near to that to which it goes (metres) is the same, a little farther on.
   @same 1.0
-  # Who is nearer to a place has this much around it to itself (metres); others wait for what it sees.
+  # The robot nearer to a place has this much around it to itself (metres); others wait for what it sees.
   @taken 3.0
   # It would rather stand with so much room around it (metres), not in a doorway.
   @room 0.8
@@ -148,7 +148,7 @@ defmodule Missions.Landmark.Lookout.Legs do
     Pose.distance(here, lookout.at) < @still or (grid != nil and Grid.free?(grid, here, @room))
   end
 
-  # Those who still search.
+  # The goals of robots that still search.
   defp goals(%{others: others}, mission) do
     beats = Landmark.State.beats(mission)
 

@@ -72,7 +72,7 @@ defmodule Missions.Landmark.Rounds.Opening do
     do: epoch <= View.leading_epoch(mission)
 
   # A round would wait in vain for a member that is gone, and leave out one that came. A robot
-  # that has only just been switched on has heard nobody yet, but then nobody is gone.
+  # that has only just been switched on has heard none yet, but then none is gone.
   defp reopen(%{round: %{view: view}} = mission, view, _since), do: mission
 
   defp reopen(%{round: round} = mission, view, since) do

@@ -1,5 +1,5 @@
 defmodule Missions.Landmark.Rounds.View do
-  @moduledoc "Decides who takes part in the landmark mission, as far as a robot hears. Pure."
+  @moduledoc "Decides which robots take part in the landmark mission, as far as a robot hears. Pure."
   alias Missions.Landmark
   alias Swarm.Membership.Heartbeat
 

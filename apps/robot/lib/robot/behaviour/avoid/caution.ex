@@ -4,7 +4,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
 
   That is a robot that was started again on its way and has not found its place since; and one whose sonars see something
   that it cannot explain, but that may be another robot: because it is not sure of its own place among the others, or no
-  longer hears one of them, which may have driven on since. Where walls are that nobody has told of, what has stood still for a
+  longer hears one of them, which may have driven on since. Where unreported walls are, what has stood still for a
   while is not what it must beware of (`.Echoes`).
   """
   alias Hal.{Pose, Twist}

@@ -11,14 +11,14 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   alias Robot.Navigation.PassingPlace
   alias Robot.Percept
 
-  # So far ahead on its way (metres) a robot looks for others, and so far for whom it has met.
+  # So far ahead on its way (metres) a robot looks for others, and so far for the one that it has met.
   @ahead 5.0
   @met_ahead 9.0
-  # Whoever has a passing place so near (metres) gets past by keeping aside.
+  # A robot with a passing place so near (metres) gets past by keeping aside.
   @easy 0.35
   # So much farther than the nearest place (metres) it goes for one where it is less in the way.
   @aside 1.0
-  # Whose name comes first may have so much less to go back (metres).
+  # The robot whose name comes first may have so much less to go back (metres).
   @first 0.3
   # Two robots so near (metres) that have been before each other for so long, no faster than so (m/s), have judged
   # differently.
@@ -27,14 +27,14 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   @slow 0.1
   # The way is free when the other has been off it for so long.
   @free_ms 700
-  # Whoever waits goes on if the other has stood for so long, or at last after so long; and waits so often in vain.
+  # A robot that waits goes on if the other has stood for so long, or at last after so long; and waits so often in vain.
   @still_ms 6_000
   @longest_ms 40_000
   @often 3
 
   defstruct now: nil, vain: %{}, facing: nil
 
-  @typedoc "Whom it meets: `place`, where it waits, `nil` if it goes on; `line`, its way, by which it sees that it is free."
+  @typedoc "The robot met: `place`, where it waits, `nil` if it goes on; `line`, its way, by which it sees that it is free."
   @type meeting :: %{
           id: atom(),
           place: Pose.point() | nil,
@@ -45,7 +45,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
         }
 
   @typedoc """
-  `vain` counts how often meeting each came to nothing since it last passed that one; `facing` is before whom it stands, and
+  `vain` counts how often meeting each came to nothing since it last passed it; `facing` is the robot it stands before, and
   since when.
   """
   @type t :: %__MODULE__{
@@ -118,7 +118,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
     end
   end
 
-  @doc "Whether one of these is near whom it meets, and who needs time."
+  @doc "Whether the robot that it meets is among these, and near: passing takes time."
   @spec near?(t(), [Neighbours.t()]) :: boolean()
   def near?(%__MODULE__{now: nil}, _robots), do: false
 
@@ -183,7 +183,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   defp metres({metres, _place}), do: metres
   defp metres(nil), do: nil
 
-  # Remembers whom it has been facing, and since when.
+  # Remembers the robot that it has been facing, and since when.
   defp face(right, there, %{at_ms: at_ms}) do
     case {Enum.find(there, &(&1.gap < @facing and slow?(&1))), right.facing} do
       {nil, _before} -> %{right | facing: nil}

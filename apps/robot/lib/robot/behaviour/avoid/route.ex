@@ -41,7 +41,7 @@ defmodule Robot.Behaviour.Avoid.Route do
   # there is one so wide.
   @by_wall 0.03
   @from_wall 0.08
-  # Sonars draw a door narrower than it is, but leave a gap of this radius (metres); and who stands in one for so long is a
+  # Sonars draw a door narrower than it is, but leave a gap of this radius (metres); and what stands in one for so long is a
   # wall.
   @gap 0.05
   @shut_ms 5_000
@@ -164,7 +164,7 @@ defmodule Robot.Behaviour.Avoid.Route do
 
   @doc """
   Whether it is known that no way leads to its goal. A floor plan proves it. What sonars have seen is doubtful, and forgotten
-  in time: it must leave no gap, and have done so for longer than somebody takes who passes a door.
+  in time: it must leave no gap, and have done so for longer than a person or robot takes to pass a door.
   """
   @spec none?(t(), Percept.t()) :: boolean()
   def none?(%__MODULE__{way?: true}, _percept), do: false

@@ -61,7 +61,7 @@ defmodule Sim.Fleet.Nodes.Child do
   def kill(child), do: Vm.signal("#{child.pid}", "KILL")
 
   @doc """
-  Waits until these, which were killed, are gone, 2 s at most: whoever looks for them after we have
+  Waits until these, which were killed, are gone, 2 s at most: a search for them after we have
   ended finds none. In the process that started them.
   """
   @spec await_ends([t()]) :: :ok

@@ -44,7 +44,7 @@ defmodule Sim.Fleet.Nodes.PortMapper do
   end
 
   @doc """
-  Ends the epmd if it is ours and nobody else uses it. Our own node must have left it before.
+  Ends the epmd if it is ours and no other node uses it. Our own node must have left it before.
   """
   @spec stop(t()) :: :ok
   def stop(nil), do: :ok

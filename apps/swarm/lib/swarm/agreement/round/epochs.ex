@@ -1,7 +1,7 @@
 defmodule Swarm.Agreement.Round.Epochs do
   @moduledoc """
   Decides which epochs a robot believes others: those that are no farther ahead of what it knows than a
-  fleet gets by itself (`Swarm.Wire.CounterGuard`). An epoch that nobody can have reached would
+  fleet gets by itself (`Swarm.Wire.CounterGuard`). An epoch that no robot can have reached would
   leave no room for the next ones. Pure.
 
   The limit is that of the robot's round, because every leadership begins with one; what a mission
@@ -48,7 +48,7 @@ defmodule Swarm.Agreement.Round.Epochs do
 
   If two of them claim an epoch beyond the limit, the lower of these is trusted: this robot is
   new, or was cut off for long. If only one does, the limit approaches it by a step a second, so
-  that even a fleet of two that somebody has pushed is joined.
+  that even a fleet of two with a number raised from outside is joined.
 
       iex> alias Swarm.Agreement.Round
       iex> round = Round.Epochs.hear(Round.new(:mag1), [7, 5_000_000], 0)

@@ -2,7 +2,7 @@ defmodule Swarm.Agreement.Round.Letter do
   @moduledoc """
   Carries a message of a round. Every letter carries the round's id, its view and the remaining time (so no shared clock
   is needed), the sender's own report, and, once it is final, its digest. `known` is the map of all reports that the
-  sender holds, sent as an echo when all reports have arrived, or when somebody asks. `purpose` says why the round is
+  sender holds, sent as an echo when all reports have arrived, or on request. `purpose` says why the round is
   held.
   """
   alias Swarm.Wire

@@ -37,7 +37,7 @@ defmodule Swarm.Agreement.Round.Tally do
   def agreed?(round),
     do: Enum.all?(round.view, &(Map.get(round.digests, &1) == round.digest))
 
-  @doc "Whether anybody has sent another digest."
+  @doc "Whether any member has sent another digest."
   @spec differing?(Round.t()) :: boolean()
   def differing?(round), do: Enum.any?(round.digests, fn {_id, d} -> d != round.digest end)
 
