@@ -137,11 +137,6 @@ defmodule System.ReleaseTest do
     if root?(), do: for(_ <- 1..3, do: assert({"1\n", 0} = robot(["rpc", "1"], environment)))
     Enum.each(flood, &Task.shutdown(&1, :brutal_kill))
 
-    # A VM of the release's own, without another Erlang on the machine.
-    code = "{m, beam, _} = :code.get_object_code(Missions.Patrol); "
-    load = code <> "Swarm.Replacement.Rehearsal.load([{m, beam}])"
-    assert {":ok\n", 0} = robot(["rpc", load], environment)
-
     # It moves only once a person has armed it.
     move = ~s|Swarm.tell(:mag1, "move:0.2:0")|
     # On a busy machine the first takes so long that the second is late.

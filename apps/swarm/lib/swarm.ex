@@ -117,7 +117,7 @@ defmodule Swarm do
   end
 
   @doc """
-  Gives a robot, a list of them, or `:all` another mission, or new code of one, while they are under way: each that is on a
+  Gives a robot, a list of them, or `:all` another mission of their release while they are under way: each that is on a
   mission is told to stand, its wheels come to rest, it changes, and goes on with the new one from its beginning; one that
   stands stays so, and begins with it at its next start. If the new one ends within 10 s, all robots of that node go
   back to what they had. `:ok` means that the robots have checked the order and are told to stand; their status says what
@@ -125,22 +125,11 @@ defmodule Swarm do
 
       Swarm.replace(:all, :flock)
       Swarm.replace([:mag1, :mag2], {:patrol, period: 60})
-      Swarm.replace(:all, {:code, Ours.Gather, radius: 2})
-      Swarm.replace(:mag1, {:code, Code.compile_file("gather.ex"), radius: 2})
 
-  With `:code`, the object code of the mission and of modules below its name goes along, at most 128 kB: of
-  the files of this node's build, as they are now, or as it is given. A robot takes only what the fleet's key has signed
-  (`Swarm.Replacement.Order`), code only of missions (`Swarm.Replacement.Code`), and a mission only if its file says
-  `replace: true`, as simulated robots do, code only if it says `replace: :code`. A restart of the robot returns to its
-  release.
+  A robot takes only what the fleet's key has signed (`Swarm.Replacement.Order`), and only if its file says
+  `replace: true`, as simulated robots do. No code comes along. A restart of the robot returns to its release.
   """
-  @spec replace(
-          robot() | [robot()] | :all,
-          mission()
-          | {mission(), keyword()}
-          | {:code, module() | [{module(), binary()}]}
-          | {:code, module() | [{module(), binary()}], keyword()}
-        ) :: answer()
+  @spec replace(robot() | [robot()] | :all, mission() | {mission(), keyword()}) :: answer()
   def replace(to, mission) do
     with {:ok, robots} <- Commands.robots(to),
          {:ok, content} <- Replacement.order(robots, mission),

@@ -28,8 +28,7 @@ defmodule Robot.Config do
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
-    * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), with `:code` also by code that
-      comes along; default `false`
+    * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), default `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
     * `:trace` - `{m, f, a}` that gets all inputs and effects, see `Robot.Trace`, or `nil`
@@ -93,7 +92,7 @@ defmodule Robot.Config do
           plan: Robot.Navigation.Grid.t() | Robot.Navigation.OccupancyGrid.t() | nil,
           fence: Fence.t() | nil,
           dry_run: boolean(),
-          replace: boolean() | :code,
+          replace: boolean(),
           estop_file: Path.t() | nil,
           departure_file: Path.t() | nil,
           trace: call() | nil,
@@ -162,7 +161,7 @@ defmodule Robot.Config do
       plan: [{:check, &plan?/1, "walls"}, default: nil],
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
-      replace: {:one_of, [false, true, :code]},
+      replace: {:one_of, [false, true]},
       estop_file: [{:path, "the path of a file"}, default: nil],
       departure_file: [{:path, "the path of a file"}, default: nil],
       trace: [:mfa, default: nil]

@@ -55,7 +55,7 @@ defmodule Robot.File do
           arm: :manual | :auto,
           fence: Robot.Fence.t() | nil,
           dry_run: boolean(),
-          replace: boolean() | :code,
+          replace: boolean(),
           estop_file: Path.t() | nil,
           console: keyword() | nil,
           record: keyword() | nil,

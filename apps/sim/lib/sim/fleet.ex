@@ -25,8 +25,7 @@ defmodule Sim.Fleet do
   `mission: false` for robots that wait for commands instead of starting their mission at once, or
   `mission: {module, options}` for another `Robot.Mission` than the search for the landmark;
   `nodes: true` for robots and world in processes of the operating system of their own; `trace` as
-  in `Robot.Config`, called with the robot's id first, and `replace: :code` for robots that take the code of missions
-  (`Swarm.replace/2`), both on one node.
+  in `Robot.Config`, called with the robot's id first, on one node.
 
       {:ok, fleet} = Sim.Fleet.start_link()
       {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag1, :mag2, :min1], map: "hospital", mission: false)
@@ -36,7 +35,7 @@ defmodule Sim.Fleet do
   @spec start_link(keyword() | map()) :: {:ok, pid()} | {:error, line :: String.t()}
   def start_link(options \\ []) do
     options = Map.new(options)
-    {own, options} = Map.split(options, [:mission, :trace, :nodes, :replace])
+    {own, options} = Map.split(options, [:mission, :trace, :nodes])
     backend = if own[:nodes], do: Nodes, else: Local
 
     with {:ok, setup} <- Setup.new(options),
@@ -119,7 +118,7 @@ defmodule Sim.Fleet do
     # So that `terminate/2` runs, and a crash of the parts is noticed.
     Process.flag(:trap_exit, true)
 
-    case module.start(setup, Keyword.take(Map.to_list(own), [:trace, :replace])) do
+    case module.start(setup, Keyword.take(Map.to_list(own), [:trace])) do
       {:ok, backend} ->
         s = begun(setup, {module, backend}, Hal.Clock.now_ms())
         # Before any other order can arrive: this start would take its place.

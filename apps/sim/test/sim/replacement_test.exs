@@ -1,26 +1,14 @@
 defmodule Sim.ReplacementTest do
-  @moduledoc "A live fleet is given other missions, and new code of one of the box, while it drives."
+  @moduledoc "A live fleet is given other missions while it drives."
   use ExUnit.Case, async: false
   import Swarm.Case, only: [eventually: 1, order: 1]
   alias Hal.Event
   alias Robot.Board
   alias Sim.Fleet
-  alias Swarm.Versions
   @moduletag :realtime
   @moduletag :capture_log
 
   @ids [:mag61, :mag62, :min61]
-
-  # Code of the patrol's name that is none of it; the release's is loaded again when it is called.
-  defp version(number, kind) do
-    before = Code.get_compiler_option(:ignore_module_conflict)
-    Code.put_compiler_option(:ignore_module_conflict, true)
-    :code.delete(Missions.Patrol)
-    :code.purge(Missions.Patrol)
-    code = Versions.code(Missions.Patrol, number, kind)
-    Code.put_compiler_option(:ignore_module_conflict, before)
-    code
-  end
 
   @doc false
   def stage(_event, _measured, %{stage: :replacement, robot: id, what: what} = about, test),
@@ -102,50 +90,5 @@ defmodule Sim.ReplacementTest do
     told(:kept)
     for id <- @ids, do: assert(Swarm.status(id).state in [:gather, :flock, :arrived])
     Fleet.stop(fleet)
-  end
-
-  @tag long: true, realtime: :long
-  test "new code of the patrol comes while it drives; a wrong version goes back on all; the fleet's end returns to the release",
-       %{fleet: fleet} do
-    Fleet.stop(fleet)
-    # Compiled while no robot runs it.
-    [second, wrong] = for {n, kind} <- [{2, :good}, {3, :crash}], do: version(n, kind)
-    md5 = Missions.Patrol.module_info(:md5)
-
-    options = [
-      robots: @ids,
-      landmark: :none,
-      map: "hall",
-      seed: 3,
-      mission: {:patrol, period: 60}
-    ]
-
-    # Off unless configured, of simulated robots, too.
-    {:ok, fleet} = Fleet.start_link(options)
-    assert {:error, line} = order(fn -> Swarm.replace(:all, {:code, second}) end)
-    assert line =~ "it takes no code from others"
-    Fleet.stop(fleet)
-    {:ok, fleet} = Fleet.start_link([replace: :code] ++ options)
-    eventually(&drive?/0)
-
-    assert order(fn -> Swarm.replace(:all, {:code, second, speed: 0.2}) end) == :ok
-    for {speed, _says} <- told(:replaced), do: assert(speed <= 0.02)
-    eventually(fn -> Enum.any?(states(), &match?(%{says: "version 2"}, &1)) end)
-    eventually(&drive?/0)
-    told(:kept)
-
-    assert order(fn -> Swarm.replace(:all, {:code, wrong, speed: 0.3}) end) == :ok
-    told(:replaced)
-
-    for {speed, says} <- told(:back),
-        do: assert({speed <= 0.5, says =~ "version 3 is wrong"} == {true, true})
-
-    eventually(fn -> Enum.any?(states(), &match?(%{says: "version 2"}, &1)) end)
-    eventually(&drive?/0)
-    assert Fleet.result(fleet).collisions == 0
-
-    assert Missions.Patrol.module_info(:md5) != md5
-    Fleet.stop(fleet)
-    eventually(fn -> Missions.Patrol.module_info(:md5) == md5 end)
   end
 end

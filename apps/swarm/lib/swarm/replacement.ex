@@ -1,22 +1,18 @@
 defmodule Swarm.Replacement do
   @moduledoc """
-  Gives robots that are under way another mission, or new code of one (`Swarm.replace/2`): they stand, change, and go
+  Gives robots that are under way another mission of their release (`Swarm.replace/2`): they stand, change, and go
   on; what ends in its first 10 s goes back by itself.
 
   | part | what it does |
   |---|---|
   | `Swarm.Replacement.Order` | the order as bytes, and its signature by the fleet's key |
-  | `Swarm.Replacement.Code`, `.ObjectCode` | which code may come, and how it is loaded and brought back |
-  | `Swarm.Replacement.Rehearsal` | a VM that loads it first |
   | `Swarm.Replacement.Job` | one replacement on one node, as a function |
   | `Swarm.Replacement.Admission`, `.Entries` | whether an order is carried out; what is read on the boards of robots, and noted there |
   | `Swarm.Replacement.Server` | the process of a node |
 
-  The release stays as it is: nothing is written to a disk, and a robot that starts again has its own mission, and its own
-  code. On real robots it is off unless their file says `replace: true`, and code comes
-  only where it says `replace: :code`, on simulated robots, too.
+  No code comes along, and nothing is written to a disk: a robot that starts again has its own mission. On real robots it is
+  off unless their file says `replace: true`. New code comes with a release (`rel/deploy`), or by IEx's `nl/2`.
   """
-  alias Hal.Options.Wording
   alias Robot.{Board, Role}
   alias Swarm.{Missions, Replacement}
   alias Swarm.Replacement.Order
@@ -28,39 +24,23 @@ defmodule Swarm.Replacement do
 
   @doc """
   The content of an order to these robots: a mission as `Swarm.start/2` takes it, `:patrol`, `{:patrol, period: 60}` or
-  `"patrol:period=60"`, or `{:code, module, options}` with the code of this node's files (`Swarm.Replacement.Code.read/1`).
-  The error is one line.
+  `"patrol:period=60"`. The error is one line.
   """
   @spec order([atom()], term()) :: {:ok, content :: binary()} | {:error, line :: String.t()}
   def order(robots, given) do
-    with {:ok, {module, options}, code} <- mission(given, length(robots)) do
+    with {:ok, {module, options}} <- mission(given, length(robots)) do
       Order.encode(%Order{
         id: :crypto.strong_rand_bytes(16),
         from: Atom.to_string(node()),
         to: Enum.map(robots, &Atom.to_string/1),
         mission: Atom.to_string(module),
-        options: Order.encode_options(options),
-        code: code
+        options: Order.encode_options(options)
       })
     end
   end
 
-  defp mission({:code, source}, count), do: mission({:code, source, []}, count)
-
-  defp mission({:code, source, options}, _count) do
-    if Keyword.keyword?(options) do
-      with {:ok, module, code} <- Replacement.Code.read(source),
-           do: {:ok, {module, options}, code}
-    else
-      {:error, "options: expected [key: value, …], got #{Wording.show(options)}"}
-    end
-  end
-
-  defp mission(text, count) when is_binary(text),
-    do: with({:ok, mission} <- Missions.Text.read(text, count), do: {:ok, mission, []})
-
-  defp mission(named, count),
-    do: with({:ok, mission} <- Missions.choose(named, count), do: {:ok, mission, []})
+  defp mission(text, count) when is_binary(text), do: Missions.Text.read(text, count)
+  defp mission(named, count), do: Missions.choose(named, count)
 
   @doc "The request to this robot, signed by the key of this node, for the stamp that the robot has given; `nil` without a key."
   @spec seal(content :: binary(), robot :: atom(), Order.stamp()) :: tuple() | nil
@@ -85,7 +65,7 @@ defmodule Swarm.Replacement do
   @spec present(Robot.Config.t()) :: [Role.effect()]
   def present(config) do
     about = %{mission: config.mission, replace: config.replace}
-    [{:put, :release, about} | if(config.replace, do: [cast(:keep)], else: [])]
+    [{:put, :release, about}]
   end
 
   defp cast(message), do: {:apply, {GenServer, :cast, [Replacement.Server, message]}}

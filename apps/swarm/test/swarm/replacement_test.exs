@@ -53,7 +53,7 @@ defmodule Swarm.ReplacementTest do
     assert order(fn -> Swarm.replace(id, {StandMission, formation: :line}) end) == :ok
     assert_receive {_stage, %{stage: :replacement, what: :changing}}, 10_000
     assert_receive {_stage, %{stage: :replacement, what: :replaced} = about}, 10_000
-    assert about.from == "#{node()}" and about.code == nil
+    assert about.from == "#{node()}"
     assert about.says == "was given #{Swarm.Missions.name(StandMission)} by #{node()}"
     eventually(fn -> match?(%{state: {_, :stand}, options: [formation: :line]}, mission(id)) end)
     assert Swarm.status(id).replaced == about.says
@@ -146,7 +146,7 @@ defmodule Swarm.ReplacementTest do
 
     for {content, line} <- [
           {"junk", "this order is malformed"},
-          {:erlang.term_to_binary({1, 2}), "this order is malformed"},
+          {:erlang.term_to_binary({2, 1}), "this order is malformed"},
           {content(:repl_other), "this order is malformed"},
           {String.duplicate("a", Order.most_bytes() + 1), "this order is larger than 128 kB"}
         ] do
@@ -171,17 +171,19 @@ defmodule Swarm.ReplacementTest do
 
     assert {:error, "no robot :repl_nobody; " <> _} = Swarm.replace(:repl_nobody, StandMission)
     assert {:error, "mission: expected " <> _} = Swarm.replace(id, 7)
-    assert {:error, "code: expected " <> _} = Swarm.replace(id, {:code, 7})
+    # No code comes along.
+    assert {:error, "mission: expected " <> _} = Swarm.replace(id, {:code, StandMission, []})
 
-    assert {:error, ":nothing has no file with its code here"} =
-             Swarm.replace(id, {:code, :nothing})
+    deep = Enum.reduce(1..300, [], fn _n, deep -> [deep] end)
 
-    assert {:error, "options: expected " <> _} = Swarm.replace(id, {:code, StandMission, 7})
-
-    assert {:error, "none of these modules is a Robot.Mission"} =
-             Swarm.replace(
-               id,
-               {:code, [:code.get_object_code(Order) |> then(fn {m, b, _} -> {m, b} end)]}
-             )
+    for options <- [
+          [formation: self()],
+          [formation: fn -> 1 end],
+          [formation: List.duplicate([], 10_000)],
+          [formation: deep]
+        ] do
+      assert {:error, line} = Swarm.replace(id, {StandMission, options})
+      assert line == "options: expected data of at most 64 kB, without processes and functions"
+    end
   end
 end

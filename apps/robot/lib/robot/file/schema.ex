@@ -45,7 +45,7 @@ defmodule Robot.File.Schema do
      arm: {:one_of, [:manual, :auto]},
      fence: {:or, nil, Fence.type()},
      dry_run: :boolean,
-     replace: {:one_of, [false, true, :code]},
+     replace: {:one_of, [false, true]},
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
      record: {:or, nil, {:keys, Robot.Recorder.Options.table()}},

@@ -134,9 +134,6 @@ defmodule Robot.File.Summary do
   defp replaceable(%{replace: true}),
     do: "whoever has the fleet's secret may give it another mission of its release on its way"
 
-  defp replaceable(%{replace: :code}),
-    do: "whoever has the fleet's secret may give it another mission, and its code, on its way"
-
   defp pictures(nil), do: nil
 
   defp pictures(options) do

@@ -43,7 +43,6 @@ defmodule Sim.Fleet.Local do
       mission: setup.mission,
       plan: setup.plan,
       trace: options[:trace],
-      replace: options[:replace] || true,
       folder: folder
     }
 

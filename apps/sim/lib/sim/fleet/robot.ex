@@ -13,7 +13,7 @@ defmodule Sim.Fleet.Robot do
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
   kind of blobs, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
-  first), what of a mission may be replaced (`Robot.Config`), and the run's folder, which holds the serial
+  first), and the run's folder, which holds the serial
   lines of robots with real drivers.
   """
   @type common :: %{
@@ -25,7 +25,6 @@ defmodule Sim.Fleet.Robot do
           plan:
             Elixir.Robot.Navigation.Grid.t() | Elixir.Robot.Navigation.OccupancyGrid.t() | nil,
           trace: Robot.Config.call() | nil,
-          replace: true | :code,
           folder: Path.t() | nil
         }
 
@@ -123,7 +122,7 @@ defmodule Sim.Fleet.Robot do
         colours: World.colours(),
         mission: common.mission,
         plan: common.plan,
-        replace: common.replace,
+        replace: true,
         trace: trace(common.trace, id)
       ] ++ drivers(robot, device, common.folder)
     )

@@ -1,19 +1,14 @@
 defmodule Swarm.Replacement.Admission do
   @moduledoc false
-  # Decides whether an order is carried out: by its signer and time; whether its robots allow it now; whether its code may
-  # come (`Swarm.Replacement.Code`). All robots of the node that it is for take it, or none. An error is one line.
-  alias Swarm.Replacement
-  alias Robot.Names
+  # Decides whether an order is carried out: by its signer and time; whether its robots allow it now; whether this build has
+  # its mission. All robots of the node that it is for take it, or none. An error is one line.
+  alias Robot.Mission
   alias Swarm.Replacement.{Entries, Job, Order}
 
   @watch_s div(Job.watch_ms(), 1_000)
 
   @typedoc "An order that is being carried out."
-  @type job :: %{
-          required(:job) => Job.t(),
-          required(:modules) => [{module(), binary()}],
-          optional(atom()) => term()
-        }
+  @type job :: %{required(:job) => Job.t(), optional(atom()) => term()}
 
   @doc """
   The order in a request to this robot. Nothing of its content is looked at before the signature, which `sign`
@@ -49,35 +44,39 @@ defmodule Swarm.Replacement.Admission do
       else: {:error, "this order is larger than #{div(Order.most_bytes(), 1024)} kB"}
   end
 
-  @doc "Which robots of this node it is for, and what it brings, if all of that may be now."
-  @spec admit(
-          Order.t(),
-          [job()],
-          loaded :: Replacement.Code.store(),
-          kept :: Replacement.Code.store()
-        ) ::
-          {:ok, [atom()], module(), [{module(), binary()}], Replacement.Code.earlier()}
-          | {:error, line :: String.t()}
-  def admit(order, jobs, loaded, kept) do
+  @doc "Which robots of this node it is for, and which mission it brings, if all of that may be now."
+  @spec admit(Order.t(), [job()]) ::
+          {:ok, [atom()], module()} | {:error, line :: String.t()}
+  def admit(order, jobs) do
     robots = Entries.meant(order)
     busy = Enum.filter(jobs, &busy?/1)
 
-    with :ok <- each(robots, &free(&1, order, busy)),
-         {:ok, module, modules, earlier} <- Replacement.Code.check(order, loaded, kept),
-         :ok <- alone(Keyword.keys(modules), robots, busy),
-         do: {:ok, robots, module, modules, earlier}
+    with :ok <- each(robots, &free(&1, busy)),
+         {:ok, module} <- mission(order),
+         do: {:ok, robots, module}
+  end
+
+  defp mission(%Order{mission: name}) do
+    with {:ok, module} <- existing(name), true <- Mission.mission?(module) do
+      {:ok, module}
+    else
+      _unknown -> {:error, "#{Order.name(name)} is not a mission of this build"}
+    end
+  end
+
+  defp existing(name) do
+    {:ok, String.to_existing_atom(name)}
+  rescue
+    ArgumentError -> :error
   end
 
   @doc "Whether it must not be disturbed. What has not been started yet gives way."
   @spec busy?(job()) :: boolean()
   def busy?(%{job: %{phase: phase}}), do: phase != :waiting
 
-  @doc "Whether it concerns one of these robots or modules."
-  @spec meets?(job(), [atom()], [module()]) :: boolean()
-  def meets?(%{job: job, modules: modules}, robots, names) do
-    Enum.any?(robots, &is_map_key(job.robots, &1)) or
-      Enum.any?(names, &List.keymember?(modules, &1, 0))
-  end
+  @doc "Whether it concerns one of these robots."
+  @spec meets?(job(), [atom()]) :: boolean()
+  def meets?(%{job: job}, robots), do: Enum.any?(robots, &is_map_key(job.robots, &1))
 
   defp each(robots, check) do
     Enum.find_value(robots, :ok, fn id ->
@@ -85,38 +84,35 @@ defmodule Swarm.Replacement.Admission do
     end)
   end
 
-  defp free(id, order, busy) do
+  defp free(id, busy) do
     cond do
       Entries.held?(id) ->
         {:error, "it is held by the emergency stop; reset it first"}
 
-      Enum.any?(busy, &meets?(&1, [id], [])) ->
+      Enum.any?(busy, &meets?(&1, [id])) ->
         {:error, "what it was given last is watched for #{@watch_s} s first"}
 
       true ->
-        Entries.allowed(id, order.code != [])
+        Entries.allowed(id)
     end
   end
 
-  # Code is the node's: a robot that runs it but is not meant would go on with a state that the new code does not know.
-  defp alone(names, robots, busy) do
-    others =
-      for id <- Names.robots() -- robots, {module, _} <- [Entries.running(id)], do: {id, module}
+  @doc "The options as this mission checks them, after it has made a state by them for each robot; the error is one line."
+  @spec rehearse(module(), Order.t(), [atom()]) :: {:ok, keyword()} | {:error, line :: String.t()}
+  def rehearse(module, order, robots) do
+    with {:ok, options} <- options(order),
+         {:ok, options} <- Mission.check_options(module, options, length(robots)) do
+      for robot <- robots do
+        {phase, _mission, effects} = module.init(robot, options)
+        true = is_atom(phase) and is_list(effects)
+      end
 
-    other = Enum.find(others, fn {_id, module} -> module in names end)
-
-    cond do
-      Enum.any?(busy, &meets?(&1, [], names)) ->
-        {:error, "the same code was given to others, and is watched for #{@watch_s} s first"}
-
-      other ->
-        {id, module} = other
-
-        {:error,
-         "#{id} runs #{inspect(module)} on this node, too, and they share its code: give it to both"}
-
-      true ->
-        :ok
+      {:ok, options}
     end
+  end
+
+  defp options(order) do
+    with :error <- Order.options(order),
+         do: {:error, "its options have names that this build does not know"}
   end
 end

@@ -15,21 +15,12 @@ defmodule Swarm.Replacement.Entries do
   @typedoc "What was put in the place of the mission of the robot's config, if anything (`Robot.Board`)."
   @type noted :: %{mission: Job.mission() | nil, changing?: boolean(), says: String.t()} | nil
 
-  @doc "Whether the robot's config allows another mission, with `code?` one whose code comes along; the error is one line."
-  @spec allowed(atom(), code? :: boolean()) :: :ok | {:error, line :: String.t()}
-  def allowed(robot, code? \\ false) do
+  @doc "Whether the robot's config allows another mission; the error is one line."
+  @spec allowed(atom()) :: :ok | {:error, line :: String.t()}
+  def allowed(robot) do
     case entry(robot, :release) do
-      %{replace: :code} ->
-        :ok
-
-      %{replace: true} when code? ->
-        {:error, "it takes no code from others: its file does not say replace: :code"}
-
-      %{replace: true} ->
-        :ok
-
-      _off ->
-        {:error, "its mission cannot be replaced: its file does not say replace: true"}
+      %{replace: true} -> :ok
+      _off -> {:error, "its mission cannot be replaced: its file does not say replace: true"}
     end
   end
 
@@ -89,9 +80,9 @@ defmodule Swarm.Replacement.Entries do
         do: job.mission,
         else: with(%{mission: mission} <- before, do: mission)
 
-    code = Order.digest(order)
-    says = says(what, why, name(job, code), order.from)
-    about = %{robot: robot, stage: :replacement, what: what, from: order.from, code: code}
+    {module, _options} = job.mission
+    says = says(what, why, Missions.name(module), order.from)
+    about = %{robot: robot, stage: :replacement, what: what, from: order.from}
 
     with {:ok, at_ms} <-
            put(robot, %{mission: mission, changing?: what == :changing, says: says}),
@@ -107,9 +98,6 @@ defmodule Swarm.Replacement.Entries do
       {:ok, at_ms}
     end
   end
-
-  defp name(%{mission: {module, _options}}, nil), do: Missions.name(module)
-  defp name(%{mission: {module, _options}}, code), do: "#{Missions.name(module)} (code #{code})"
 
   defp says(:changing, _why, mission, from), do: "is given #{mission} by #{from}"
   defp says(:replaced, _why, mission, from), do: "was given #{mission} by #{from}"

@@ -5,21 +5,19 @@ defmodule Swarm.Replacement.Job do
 
   | phase | ends when | then |
   |---|---|---|
-  | `:standing` | all that were on a mission have ended it, by way of their gates, and their wheels rest; 3 s at most | the code is loaded |
-  | `:loading` | the code is loaded, in a VM of its own first; 10 s at most | the mission is tried: its options are checked, and a state is made and thrown away |
+  | `:standing` | all that were on a mission have ended it, by way of their gates, and their wheels rest; 3 s at most | the mission is tried: its options are checked, and a state is made and thrown away |
   | `:trying` | that has gone well; 2 s at most | those that were on a mission start it |
   | `:waiting` | a person starts the mission, because no robot was on one | it is watched |
   | `:watching` | 10 s have passed | it stays |
-  | `:returning` | all have ended it, 3 s at most | code and missions are as before, and robots go on |
+  | `:returning` | all have ended it, 3 s at most | missions are as before, and robots go on |
 
-  What goes wrong up to the end of `:watching` leads back for all robots of the node, because they share its code. A robot
+  What goes wrong up to the end of `:watching` leads back for all robots of the node. A robot
   that a person stops meanwhile stays where it is, and nothing starts it again. A robot that had no mission stays idle after
   a rollback.
 
   | effect | |
   |---|---|
   | `{:stand, id}` | end its mission; `{:stood, id}` when its gate has confirmed that |
-  | `:load`, `:restore` | load the code (`{:loaded, result}`), or what was there before |
   | `:try` | `{:tried, result}` |
   | `{:start, id, mission}` | `{:started, id, result}`, and as below |
   | `{:watch, id}` | from now on `{:crashed, id}` if its pilot ends |
@@ -28,7 +26,6 @@ defmodule Swarm.Replacement.Job do
 
   @stand_ms 3_000
   @again_ms 500
-  @load_ms 10_000
   @try_ms 2_000
   @watch_ms 10_000
 
@@ -42,7 +39,7 @@ defmodule Swarm.Replacement.Job do
   @type t :: %__MODULE__{
           robots: %{atom() => %{was: mission() | nil, stands?: boolean()}},
           mission: mission(),
-          phase: :standing | :loading | :trying | :waiting | :watching | :returning | :done,
+          phase: :standing | :trying | :waiting | :watching | :returning | :done,
           since_ms: integer(),
           asked_ms: integer(),
           why: String.t() | nil
@@ -51,7 +48,6 @@ defmodule Swarm.Replacement.Job do
 
   @type event ::
           {:stood, atom()}
-          | {:loaded, :ok | {:error, String.t()}}
           | {:tried, {:ok, keyword()} | {:error, String.t()}}
           | {:started, atom(), :ok | {:error, term()}}
           | {:runs, atom()}
@@ -61,8 +57,6 @@ defmodule Swarm.Replacement.Job do
 
   @type effect ::
           {:stand, atom()}
-          | :load
-          | :restore
           | :try
           | {:start, atom(), mission()}
           | {:watch, atom()}
@@ -86,17 +80,11 @@ defmodule Swarm.Replacement.Job do
 
   def step(job, {:gone, id}, _now_ms) do
     job = %{job | robots: Map.delete(job.robots, id)}
-    if job.robots == %{}, do: done(job, undo(job)), else: {job, []}
+    if job.robots == %{}, do: done(job, []), else: {job, []}
   end
 
   def step(%{phase: phase} = job, {:stood, id}, _now_ms) when phase in [:standing, :returning],
     do: {put(job, id, :stands?, true), []}
-
-  def step(%{phase: :loading} = job, {:loaded, :ok}, now_ms),
-    do: {at(job, :trying, now_ms), [:try]}
-
-  def step(%{phase: :loading} = job, {:loaded, {:error, line}}, _now_ms),
-    do: resume(job, line, [])
 
   def step(%{phase: :trying} = job, {:tried, {:ok, options}}, now_ms) do
     {module, _options} = job.mission
@@ -119,7 +107,7 @@ defmodule Swarm.Replacement.Job do
 
   # It has not been started, so all still stand.
   def step(%{phase: :trying} = job, {:tried, {:error, line}}, _now_ms),
-    do: resume(job, line, [:restore])
+    do: resume(job, line, [])
 
   def step(%{phase: :watching} = job, {:started, _id, :ok}, _now_ms), do: {job, []}
 
@@ -145,21 +133,15 @@ defmodule Swarm.Replacement.Job do
     late = waits(job) ++ Enum.filter(on(job), &(&1 in turning))
 
     cond do
-      late == [] -> {at(job, :loading, now_ms), effects ++ [:load]}
+      late == [] -> {at(job, :trying, now_ms), effects ++ [:try]}
       now_ms - job.since_ms >= @stand_ms -> resume(job, "#{hd(late)} does not stand", [])
       true -> again(job, effects, now_ms)
     end
   end
 
-  defp next(%{phase: :loading} = job, effects, _turning, now_ms) do
-    if now_ms - job.since_ms >= @load_ms,
-      do: resume(job, "loading its code does not end", effects),
-      else: {job, effects}
-  end
-
   defp next(%{phase: :trying} = job, effects, _turning, now_ms) do
     if now_ms - job.since_ms >= @try_ms,
-      do: resume(job, "its init does not return", effects ++ [:restore]),
+      do: resume(job, "its init does not return", effects),
       else: {job, effects}
   end
 
@@ -171,7 +153,7 @@ defmodule Swarm.Replacement.Job do
 
   defp next(%{phase: :returning} = job, effects, _turning, now_ms) do
     if waits(job) == [] or now_ms - job.since_ms >= @stand_ms,
-      do: resume(job, job.why, effects ++ [:restore]),
+      do: resume(job, job.why, effects),
       else: again(job, effects, now_ms)
   end
 
@@ -194,12 +176,6 @@ defmodule Swarm.Replacement.Job do
     starts = for id <- on(job), do: {:start, id, job.robots[id].was}
     done(job, effects ++ [{:note, :back, why} | starts])
   end
-
-  # Of robots that have all ended.
-  defp undo(%{phase: phase}) when phase in [:trying, :waiting, :watching, :returning],
-    do: [:restore]
-
-  defp undo(_nothing_loaded), do: []
 
   defp done(job, effects), do: {%{job | phase: :done}, effects}
   defp at(job, phase, now_ms), do: %{job | phase: phase, since_ms: now_ms}

@@ -3,9 +3,7 @@ defmodule Swarm.Replacement.Order do
   # Encodes the order that replaces a mission, as bytes, with its signature. Pure.
   #
   # Its content is the same for all robots that it is meant for: an identity, its sender, its receivers, the mission with its
-  # options, and, where the code of the mission comes along, object code by the names of its modules. Names are text: no
-  # byte of it becomes an atom before the signature was checked, and names of options only after the code that
-  # knows them was loaded.
+  # options. Names are text: no byte of it becomes an atom, but what the build knows.
   #
   # The signature (`Mesh.sign/2`) is an HMAC-SHA256, by a key derived from the fleet's secret, over the robot's name, the stamp that this
   # robot has given for this order (`Swarm.Order.Freshness`), and a digest of the content. So it is good for one robot,
@@ -15,7 +13,6 @@ defmodule Swarm.Replacement.Order do
   alias Swarm.Wire
 
   @label "convoy replacement 1"
-  # An order must arrive within half a second. The largest mission in the box takes a third of it.
   @most_bytes 131_072
   # What it takes in memory, unpacked; and so its options alone.
   @most_memory 1_000_000
@@ -23,16 +20,15 @@ defmodule Swarm.Replacement.Order do
   @most_name 255
 
   @enforce_keys [:id, :from, :to, :mission, :options]
-  defstruct @enforce_keys ++ [code: []]
+  defstruct @enforce_keys
 
-  @typedoc "`options` are encoded (`options/1`); `code` is object code by the names of its modules."
+  @typedoc "`options` are encoded (`options/1`)."
   @type t :: %__MODULE__{
           id: binary(),
           from: String.t(),
           to: [String.t()],
           mission: String.t(),
-          options: binary(),
-          code: [{module :: String.t(), binary()}]
+          options: binary()
         }
 
   @typedoc "The stamp of the order, or the time on the same node (`Swarm.Commands.Client`)."
@@ -49,39 +45,25 @@ defmodule Swarm.Replacement.Order do
   @doc "The order as bytes; the error is one line that says how large it is."
   @spec encode(t()) :: {:ok, binary()} | {:error, line :: String.t()}
   def encode(%__MODULE__{} = order) do
-    term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
+    term = {2, order.id, order.from, order.to, order.mission, order.options}
     content = :erlang.term_to_binary(term, [:compressed])
 
-    cond do
-      byte_size(content) > @most_bytes ->
-        large(order, "#{div(@most_bytes, 1024)} kB", byte_size(content))
-
-      not ExternalTerm.decodable?(term, @most_memory) ->
-        large(order, "#{div(@most_memory, 1_000)} kB, unpacked", :erlang.external_size(term))
-
-      not ExternalTerm.bounded?(order.options, @most_options) ->
-        {:error,
-         "options: expected data of at most #{div(@most_options, 1024)} kB, without processes and functions"}
-
-      true ->
-        {:ok, content}
-    end
+    if ExternalTerm.bounded?(order.options, @most_options) and byte_size(content) <= @most_bytes and
+         ExternalTerm.decodable?(term, @most_memory),
+       do: {:ok, content},
+       else:
+         {:error,
+          "options: expected data of at most #{div(@most_options, 1024)} kB, without processes and functions"}
   end
-
-  defp large(order, most, bytes),
-    do:
-      {:error,
-       "#{name(order.mission)}: expected code of at most #{most}, got #{div(bytes, 1024)} kB"}
 
   @doc "The order of bytes whose signature was checked; `:error` for anything else."
   @spec decode(binary()) :: {:ok, t()} | :error
   def decode(content) do
-    with {:ok, {1, <<_::128>> = id, from, to, mission, options, code}} <-
+    with {:ok, {2, <<_::128>> = id, from, to, mission, options}} <-
            ExternalTerm.decode(content, @most_memory),
          true <- name?(from) and name?(mission) and is_binary(options),
-         true <- Wire.list?(to, &name?/1) and Wire.list?(code, &code?/1) do
-      {:ok,
-       %__MODULE__{id: id, from: from, to: to, mission: mission, options: options, code: code}}
+         true <- Wire.list?(to, &name?/1) do
+      {:ok, %__MODULE__{id: id, from: from, to: to, mission: mission, options: options}}
     else
       _other -> :error
     end
@@ -101,8 +83,6 @@ defmodule Swarm.Replacement.Order do
   end
 
   defp name?(text), do: is_binary(text) and byte_size(text) in 1..@most_name
-  defp code?({name, code}), do: name?(name) and is_binary(code)
-  defp code?(_other), do: false
 
   @doc "The bytes that are signed: this content, for this robot, at this time."
   @spec signed_bytes(robot :: atom(), stamp(), content :: binary()) :: binary()
@@ -113,23 +93,6 @@ defmodule Swarm.Replacement.Order do
   @spec same?(<<_::256>>, term()) :: boolean()
   def same?(mac, given),
     do: is_binary(given) and byte_size(given) == 32 and :crypto.hash_equals(mac, given)
-
-  @doc "The digest of an order's code that people compare, 8 hexadecimal digits; `nil` without code."
-  @spec digest(t()) :: String.t() | nil
-  def digest(%__MODULE__{code: []}), do: nil
-
-  def digest(%__MODULE__{code: code}) do
-    md5s = for {_name, beam} <- Enum.sort(code), do: md5(beam)
-    md5s |> :erlang.md5() |> Base.encode16(case: :lower) |> binary_part(0, 8)
-  end
-
-  # Of what is executed, without debug information; of checked code.
-  defp md5(beam) do
-    case :beam_lib.md5(beam) do
-      {:ok, {_module, md5}} -> md5
-      {:error, :beam_lib, _reason} -> :erlang.md5(beam)
-    end
-  end
 
   @doc """
   A module's name for people.

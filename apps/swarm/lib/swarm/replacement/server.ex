@@ -1,15 +1,13 @@
 defmodule Swarm.Replacement.Server do
   @moduledoc false
-  # Runs the process of `Swarm.Replacement`, one on a node, because its robots share their code: checks orders, carries out
-  # the effects of `Swarm.Replacement.Job`, and remembers what the release had. If it ends, so that nothing watches any more,
-  # its successor brings back the release.
+  # Runs the process of `Swarm.Replacement`, one on a node: checks orders, and carries out the effects of
+  # `Swarm.Replacement.Job`. If it ends, so that nothing watches any more, its successor brings back the release's missions.
   use GenServer
-  alias Swarm.Replacement
   alias Hal.Event
   alias Mesh.{Nonblocking, Secret}
   alias Robot.{Board, Names}
   alias Robot.Control.{Delivery, Pilot}
-  alias Swarm.Replacement.{Admission, Entries, Job, Order, Rehearsal}
+  alias Swarm.Replacement.{Admission, Entries, Job, Order}
 
   @tick_ms 50
   @start_ms 2_000
@@ -53,9 +51,6 @@ defmodule Swarm.Replacement.Server do
 
     s = %{
       secret: Secret.random(),
-      kept: %{},
-      loaded: %{},
-      release: %{},
       jobs: %{},
       taken: %{},
       seen: %{},
@@ -67,19 +62,15 @@ defmodule Swarm.Replacement.Server do
     {:ok, s, {:continue, :forget}}
   end
 
-  # A predecessor may have left missions, and code, that nothing watches any more.
+  # A predecessor may have left missions that nothing watches any more.
   @impl GenServer
   def handle_continue(:forget, s) do
-    left = Enum.filter(Names.robots(), &Entries.noted/1)
-
-    for robot <- left do
+    for robot <- Names.robots(), Entries.noted(robot) do
       Pilot.halt_at_once(robot, nil)
       Entries.forget(robot, "#{inspect(__MODULE__)} was started again")
     end
 
-    if left != [], do: Replacement.Code.revert()
-    allowed? = Enum.any?(Names.robots(), &(Entries.allowed(&1) == :ok))
-    {:noreply, if(allowed?, do: %{s | kept: Replacement.Code.keep()}, else: s)}
+    {:noreply, s}
   end
 
   @impl GenServer
@@ -90,11 +81,6 @@ defmodule Swarm.Replacement.Server do
   def handle_call(_unknown, _from, s), do: {:noreply, s}
 
   @impl GenServer
-  def handle_cast(:keep, %{kept: kept} = s) when kept == %{},
-    do: {:noreply, %{s | kept: Replacement.Code.keep()}}
-
-  def handle_cast(:keep, s), do: {:noreply, s}
-
   def handle_cast({:take, robot, {:replace, content, mac}, {life, at_us} = stamp, ref}, s)
       when is_atom(robot) and is_binary(content) and (is_integer(life) or life == :asked) and
              is_integer(at_us) and is_reference(ref) do
@@ -151,11 +137,11 @@ defmodule Swarm.Replacement.Server do
     do: if(Mesh.running?(), do: Mesh.sign(Order.label(), bytes), else: {:ok, own(bytes, s)})
 
   defp admit(order, s, at_us) do
-    case Admission.admit(order, Map.values(s.jobs), s.loaded, s.kept) do
-      {:ok, robots, module, modules, earlier} ->
+    case Admission.admit(order, Map.values(s.jobs)) do
+      {:ok, robots, module} ->
         # The same order to the next robot of this node comes within half a second.
         s = put_in(s.seen, recent(s.seen, order.id))
-        {:ok, begin(order, robots, {module, modules, earlier}, at_us, s)}
+        {:ok, begin(order, robots, module, at_us, s)}
 
       {:error, line} ->
         {{:error, line}, s}
@@ -167,13 +153,11 @@ defmodule Swarm.Replacement.Server do
     seen |> Map.filter(fn {_id, at_ms} -> now_ms - at_ms < @seen_ms end) |> Map.put(id, now_ms)
   end
 
-  defp begin(order, robots, {module, modules, earlier}, at_us, s) do
-    names = Keyword.keys(modules)
-
+  defp begin(order, robots, module, at_us, s) do
     waiting =
       for {id, entry} <- s.jobs,
           not Admission.busy?(entry),
-          Admission.meets?(entry, robots, names),
+          Admission.meets?(entry, robots),
           do: id
 
     s = Enum.reduce(waiting, s, &finish(&2, &1))
@@ -183,15 +167,7 @@ defmodule Swarm.Replacement.Server do
     before = Map.new(robots, &{&1, Entries.noted(&1)})
     {job, effects} = Job.new(on, {module, []}, Hal.Clock.now_ms())
 
-    entry = %{
-      job: job,
-      order: order,
-      modules: modules,
-      earlier: earlier,
-      before: before,
-      at_us: at_us
-    }
-
+    entry = %{job: job, order: order, before: before, at_us: at_us}
     schedule(carry_out(effects, order.id, put_in(s.jobs[order.id], entry)))
   end
 
@@ -215,12 +191,12 @@ defmodule Swarm.Replacement.Server do
 
     for {monitor, what} <- over do
       Process.demonitor(monitor, [:flush])
-      with {kind, ^id, pid} when kind in [:load, :try] <- what, do: Process.exit(pid, :kill)
+      with {:try, ^id, pid} <- what, do: Process.exit(pid, :kill)
     end
 
     s = %{s | jobs: Map.delete(s.jobs, id), monitors: Map.new(monitors)}
     if s.jobs == %{}, do: Event.detach(__MODULE__)
-    forsaken(s)
+    s
   end
 
   defp carry_out(effects, id, s), do: Enum.reduce(effects, s, &effect(&1, id, s.jobs[id], &2))
@@ -230,21 +206,11 @@ defmodule Swarm.Replacement.Server do
     s
   end
 
-  defp effect(:load, id, %{modules: []}, s), do: step(s, id, {:loaded, :ok})
-
-  # What aborts a VM must not abort this one.
-  defp effect(:load, id, %{modules: modules}, s) do
-    {pid, monitor} = spawn_monitor(fn -> exit({:rehearsed, Rehearsal.load(modules)}) end)
-    put_in(s.monitors[monitor], {:load, id, pid})
-  end
-
-  defp effect(:restore, _id, %{earlier: earlier}, s), do: restore(earlier, s)
-
   defp effect(:try, id, %{order: order, job: %{mission: {module, _}} = job}, s) do
     robots = Map.keys(job.robots)
     # It is foreign code, which may do anything but return.
     {pid, monitor} =
-      spawn_monitor(fn -> exit({:tried, Rehearsal.init(module, order, robots)}) end)
+      spawn_monitor(fn -> exit({:tried, Admission.rehearse(module, order, robots)}) end)
 
     put_in(s.monitors[monitor], {:try, id, pid})
   end
@@ -273,28 +239,6 @@ defmodule Swarm.Replacement.Server do
     s
   end
 
-  defp ended({:load, id, _pid}, {:rehearsed, :ok}, s) do
-    %{modules: modules, earlier: earlier} = s.jobs[id]
-    result = Replacement.Code.load(modules)
-
-    s =
-      if result == :ok,
-        do: %{
-          s
-          | loaded: Map.merge(s.loaded, Map.new(modules)),
-            release: Map.merge(Map.new(earlier), s.release)
-        },
-        else: s
-
-    step(s, id, {:loaded, result})
-  end
-
-  defp ended({:load, id, _pid}, {:rehearsed, error}, s), do: step(s, id, {:loaded, error})
-
-  defp ended({:load, id, _pid}, _aborted, s),
-    do:
-      step(s, id, {:loaded, {:error, "its code cannot be loaded: a VM that tried it has ended"}})
-
   defp ended({:try, id, _pid}, {:tried, result}, s), do: step(s, id, {:tried, result})
 
   defp ended({:try, id, _pid}, reason, s),
@@ -304,7 +248,7 @@ defmodule Swarm.Replacement.Server do
 
   defp ended({:robot, robot}, _reason, s) do
     s = Enum.reduce(Map.keys(s.jobs), s, &step(&2, &1, {:gone, robot}))
-    forsaken(%{s | taken: Map.delete(s.taken, robot)})
+    %{s | taken: Map.delete(s.taken, robot)}
   end
 
   # A pilot that is there again has crashed, or what it depends on has. One that is not may have ended with its robot.
@@ -319,32 +263,6 @@ defmodule Swarm.Replacement.Server do
       true ->
         s
     end
-  end
-
-  # A robot that starts again has the mission of its release, and its code once no other uses what came in its place.
-  defp forsaken(s) do
-    coming? = Enum.any?(s.jobs, fn {_id, entry} -> entry.modules != [] end)
-
-    if coming? or Enum.any?(Names.robots(), &uses?(&1, s.release)),
-      do: s,
-      else: restore(Map.to_list(s.release), s)
-  end
-
-  defp uses?(robot, release) do
-    noted = with %{mission: mission} <- Entries.noted(robot), do: mission
-    Enum.any?([noted, Entries.running(robot)], &(&1 != nil and is_map_key(release, elem(&1, 0))))
-  end
-
-  defp restore(earlier, s) do
-    Replacement.Code.restore(earlier)
-    back = for {module, beam} <- earlier, s.release[module] == beam, do: module
-    now = for {module, beam} <- earlier, is_binary(beam), module not in back, do: {module, beam}
-
-    %{
-      s
-      | loaded: s.loaded |> Map.drop(Keyword.keys(earlier)) |> Map.merge(Map.new(now)),
-        release: Map.drop(s.release, back)
-    }
   end
 
   defp watch(id, s) do

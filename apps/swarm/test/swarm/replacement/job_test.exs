@@ -19,7 +19,7 @@ defmodule Swarm.Replacement.JobTest do
   defp started(robots) do
     {job, _effects} = new(robots)
     stood = for {id, was} when was != nil <- Enum.sort(robots), do: {{:stood, id}, 100}
-    up = [{{:tick, []}, 200}, {{:loaded, :ok}, 300}, {{:tried, {:ok, [radius: 2]}}, 400}]
+    up = [{{:tick, []}, 200}, {{:tried, {:ok, [radius: 2]}}, 400}]
     {%{phase: :watching} = job, effects} = run(job, stood ++ up)
     {job, effects}
   end
@@ -30,8 +30,7 @@ defmodule Swarm.Replacement.JobTest do
     assert effects == [{:note, :changing, nil}, {:stand, :mag1}, {:stand, :mag2}]
 
     {job, []} = run(job, [{{:stood, :mag1}, 50}, {{:tick, []}, 100}])
-    assert {job, [:load]} = run(job, [{{:stood, :mag2}, 150}, {{:tick, []}, 200}])
-    assert {job, [:try]} = run(job, [{{:loaded, :ok}, 200}])
+    assert {job, [:try]} = run(job, [{{:stood, :mag2}, 150}, {{:tick, []}, 200}])
     {job, effects} = run(job, [{{:tried, {:ok, [radius: 2]}}, 250}])
     mission = {Ours.New, [radius: 2]}
 
@@ -48,22 +47,22 @@ defmodule Swarm.Replacement.JobTest do
   test "a robot has to come to rest first, and is asked again if its pilot was just away" do
     {job, _effects} = new(%{mag1: @was})
     assert {job, []} = run(job, [{{:stood, :mag1}, 50}, {{:tick, [:mag1]}, 600}])
-    assert {_job, [:load]} = run(job, [{{:tick, [:mag2]}, 700}])
+    assert {_job, [:try]} = run(job, [{{:tick, [:mag2]}, 700}])
 
     {job, _effects} = new(%{mag1: @was})
     assert {job, []} = run(job, [{{:tick, []}, 499}])
     assert {job, [{:stand, :mag1}]} = run(job, [{{:tick, []}, 500}, {{:tick, []}, 550}])
-    # In vain: it goes on as before, and nothing was loaded.
+    # In vain: it goes on as before.
     back = [{:note, :back, "mag1 does not stand"}, {:start, :mag1, @was}]
     assert {%{phase: :done}, ^back} = run(job, [{{:tick, []}, 3_000}])
   end
 
   test "no robot is on a mission: nobody is told to stand, nor to start" do
     {job, effects} = new(%{mag1: nil})
-    assert effects == [{:note, :changing, nil}, :load]
+    assert effects == [{:note, :changing, nil}, :try]
 
-    {job, effects} = run(job, [{{:loaded, :ok}, 10}, {{:tried, {:ok, []}}, 20}])
-    assert effects == [:try, {:note, :replaced, nil}]
+    {job, effects} = run(job, [{{:tried, {:ok, []}}, 20}])
+    assert effects == [{:note, :replaced, nil}]
 
     # Its first ten seconds begin with its first start.
     assert {job, []} = run(job, [{{:tick, []}, 60_000}])
@@ -75,7 +74,7 @@ defmodule Swarm.Replacement.JobTest do
     # Nobody starts what went back, because nothing ran before.
     assert {%{phase: :done}, effects} = run(job, [{{:crashed, :mag1, "boom"}, 72_000}])
     why = "it ended on mag1 after 2.0 s (boom)"
-    assert effects == [{:note, :changing, nil}, :restore, {:note, :back, why}]
+    assert effects == [{:note, :changing, nil}, {:note, :back, why}]
   end
 
   test "a version that ends within ten seconds takes all robots of the node back" do
@@ -89,7 +88,6 @@ defmodule Swarm.Replacement.JobTest do
     assert {%{phase: :done}, effects} = run(job, [{{:stood, :mag2}, 3_250}, {{:tick, []}, 3_300}])
 
     assert effects == [
-             :restore,
              {:note, :back, "it ended on mag2 after 2.3 s (boom)"},
              {:start, :mag1, @was},
              {:start, :mag2, {Ours.Old, at: 2}}
@@ -105,24 +103,20 @@ defmodule Swarm.Replacement.JobTest do
   test "one that cannot stand does not keep the others from going back" do
     {job, _effects} = started(%{mag1: @was, mag2: @was})
     {job, _effects} = run(job, [{{:crashed, :mag1, "boom"}, 1_000}, {{:stood, :mag2}, 1_050}])
-    assert {%{phase: :done}, [:restore | _more]} = run(job, [{{:tick, []}, 4_000}])
+    assert {%{phase: :done}, [{:note, :back, _why} | _more]} = run(job, [{{:tick, []}, 4_000}])
   end
 
-  test "code that cannot be loaded, options that it does not take, an init that hangs: it goes on as before" do
+  test "options that it does not take, an init that hangs: it goes on as before" do
     {job, _effects} = new(%{mag1: @was})
-    {job, _effects} = run(job, [{{:stood, :mag1}, 50}, {{:tick, []}, 100}])
+    {job, [:try]} = run(job, [{{:stood, :mag1}, 50}, {{:tick, []}, 100}])
     go_on = &[{:note, :back, &1}, {:start, :mag1, @was}]
 
-    assert {%{phase: :done}, effects} = run(job, [{{:loaded, {:error, "no"}}, 100}])
-    assert effects == go_on.("no")
-
-    {job, _effects} = run(job, [{{:loaded, :ok}, 100}])
     assert {%{phase: :done}, effects} = run(job, [{{:tried, {:error, "radius"}}, 200}])
-    assert effects == [:restore | go_on.("radius")]
+    assert effects == go_on.("radius")
 
     assert {job, []} = run(job, [{{:tick, []}, 2_099}])
     assert {%{phase: :done}, effects} = run(job, [{{:tick, []}, 2_100}])
-    assert effects == [:restore | go_on.("its init does not return")]
+    assert effects == go_on.("its init does not return")
   end
 
   test "whom a person stops meanwhile stands, and it stays; who cannot start it takes all back" do
@@ -135,24 +129,22 @@ defmodule Swarm.Replacement.JobTest do
     assert {_job, [_note | _stand]} = run(job, [{{:started, :mag2, {:error, :no_mission}}, 600}])
   end
 
-  test "a robot that ends is left out; if all have, what was loaded goes" do
+  test "a robot that ends is left out; if all have, it is over" do
     {job, _effects} = new(%{mag1: @was, mag2: @was})
     {job, []} = run(job, [{{:gone, :mag1}, 10}, {{:stood, :mag2}, 20}, {{:stood, :mag1}, 20}])
-    assert {_job, [:load]} = run(job, [{{:tick, []}, 30}])
+    assert {_job, [:try]} = run(job, [{{:tick, []}, 30}])
     assert {%{phase: :done}, []} = run(job, [{{:gone, :mag2}, 30}])
 
     {job, _effects} = started(%{mag1: @was, mag2: @was})
     # Its pilot, too, has ended with it.
     assert {job, []} = run(job, [{{:gone, :mag2}, 500}, {{:crashed, :mag2, "boom"}, 510}])
-    assert {%{phase: :done}, [:restore]} = run(job, [{{:gone, :mag1}, 500}])
+    assert {%{phase: :done}, []} = run(job, [{{:gone, :mag1}, 500}])
   end
 
   test "whatever comes in whatever order, it ends, and who was on a mission is started once more, last with what counts" do
     events = [
       {:stood, :mag1},
       {:stood, :mag2},
-      {:loaded, :ok},
-      {:loaded, {:error, "no"}},
       {:tried, {:ok, []}},
       {:tried, {:error, "no"}},
       {:started, :mag1, :ok},
@@ -172,8 +164,7 @@ defmodule Swarm.Replacement.JobTest do
         end)
 
       # What the server would answer itself never fails to come.
-      {job, more} =
-        run(job, for(n <- 1..4, e <- [{:loaded, :ok}, {:tick, []}], do: {e, 100_000 * n}))
+      {job, more} = run(job, for(n <- 1..4, do: {{:tick, []}, 100_000 * n}))
 
       effects = effects ++ more
       assert job.phase == :done
@@ -184,10 +175,6 @@ defmodule Swarm.Replacement.JobTest do
         :kept -> assert List.last(last) == {Ours.New, []}
         :back -> assert List.last(last) == @was
       end
-
-      # What was loaded is gone exactly if they went back.
-      loaded? = Enum.any?(effects, &(&1 == :try))
-      assert :restore in effects == (loaded? and List.last(notes) == :back)
     end
   end
 end

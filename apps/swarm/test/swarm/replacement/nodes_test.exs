@@ -2,7 +2,7 @@ defmodule Swarm.Replacement.NodesTest do
   @moduledoc "Robots on nodes of their own, and a person on a node without one. Nothing of this VM is shared."
   use ExUnit.Case, async: true
   import Swarm.Case, only: [eventually: 1, order: 1]
-  alias Swarm.{MeshNodes, StandMission, Versions}
+  alias Swarm.{MeshNodes, StandMission, UnfitMission}
   alias Swarm.MeshNodes.Wheels
   @moduletag :realtime
   @moduletag :cluster
@@ -14,7 +14,7 @@ defmodule Swarm.Replacement.NodesTest do
   defp ask(node, function, arguments), do: MeshNodes.call(node, Swarm, function, arguments)
   defp state(node), do: ask(node, :status, [node.name])
 
-  defp says(node, says), do: eventually(fn -> match?(%{says: ^says}, state(node)) end)
+  defp rolls(node), do: eventually(fn -> match?(%{state: :roll}, state(node)) end)
 
   defp replaced(node, what),
     do:
@@ -22,13 +22,9 @@ defmodule Swarm.Replacement.NodesTest do
         match?(%{replaced: <<^what::binary-size(byte_size(what)), _::binary>>}, state(node))
       end)
 
-  test "new code reaches all that allow it, a wrong version goes back on each, and who starts again has the release" do
+  test "a mission reaches all that allow it, a wrong one goes back on each, and who starts again has the release" do
     [base, one, two, shut] = nodes = MeshNodes.start(4)
-
-    [good, crash] =
-      for {n, kind} <- [{1, :good}, {2, :crash}], do: Versions.code(Ours.Nodes1, n, kind)
-
-    for node <- [one, two], do: start(node, replace: :code)
+    for node <- [one, two], do: start(node, replace: true)
     start(shut, [])
     names = for node <- [one, two, shut], do: node.name
     for node <- nodes, do: eventually(fn -> names -- ask(node, :find, []) == [] end)
@@ -36,29 +32,28 @@ defmodule Swarm.Replacement.NodesTest do
 
     refused = "#{shut.name}: its mission cannot be replaced: its file does not say replace: true"
 
-    assert order(fn -> ask(base, :replace, [:all, {:code, good, [speed: 0.3]}]) end) ==
+    assert order(fn -> ask(base, :replace, [:all, {UnfitMission, [speed: 0.3]}]) end) ==
              {:error, refused}
 
-    for node <- [one, two], do: says(node, "version 1")
+    for node <- [one, two], do: rolls(node)
     assert %{replaced: nil, state: :stand} = state(shut)
-    for node <- [one, two], do: replaced(node, "keeps Ours.Nodes1 (code ")
-    assert state(one).replaced =~ "given by #{base.node}"
+    for node <- [one, two], do: replaced(node, "keeps Swarm.UnfitMission, given by #{base.node}")
 
-    assert order(fn -> ask(base, :replace, [[one.name, two.name], {:code, crash}]) end) == :ok
-    for node <- [one, two], do: replaced(node, "went back from Ours.Nodes1 (code ")
-    for node <- [one, two], do: says(node, "version 1")
+    wrong = {UnfitMission, [does: :crash]}
+    assert order(fn -> ask(base, :replace, [[one.name, two.name], wrong]) end) == :ok
+    for node <- [one, two], do: replaced(node, "went back from Swarm.UnfitMission")
+    for node <- [one, two], do: rolls(node)
 
     MeshNodes.signal(two, "KILL")
     two = MeshNodes.join(nodes, two.name)
-    start(two, replace: :code)
-    refute MeshNodes.call(two, :erlang, :module_loaded, [Ours.Nodes1])
+    start(two, replace: true)
     eventually(fn -> two.name in ask(base, :find, []) end)
     assert order(fn -> ask(base, :tell, [two.name, "start"]) end) == :ok
 
     assert MeshNodes.call(two, Swarm.Case, :entry, [two.node, two.name, :mission]).state ==
              {StandMission, :stand}
 
-    says(one, "version 1")
+    assert %{state: :roll} = state(one)
   end
 end
 

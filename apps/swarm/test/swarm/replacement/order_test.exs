@@ -19,7 +19,7 @@ defmodule Swarm.Replacement.OrderTest do
   end
 
   test "an order is what it was, and names no atom that is not known" do
-    order = new(code: [{"Elixir.Ours.Gather", "code"}])
+    order = new()
     {:ok, content} = Order.encode(order)
     assert Order.decode(content) == {:ok, order}
     assert Order.options(order) == {:ok, [radius: 2]}
@@ -42,13 +42,10 @@ defmodule Swarm.Replacement.OrderTest do
           [to: [:mag1]],
           [id: "short"],
           [mission: String.duplicate("a", 256)],
-          [options: 1],
-          [code: [{"a", 1}]],
-          [code: [:a]],
-          [code: "beam"]
+          [options: 1]
         ] do
       order = new(wrong)
-      term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
+      term = {2, order.id, order.from, order.to, order.mission, order.options}
       assert {wrong, Order.decode(:erlang.term_to_binary(term))} == {wrong, :error}
     end
 
@@ -67,20 +64,14 @@ defmodule Swarm.Replacement.OrderTest do
     end
   end
 
-  test "what is too large says so" do
-    code = [{"Elixir.Ours.Gather", :crypto.strong_rand_bytes(Order.most_bytes())}]
+  test "what is too large says so, and unpacks to nothing" do
+    zeros = Order.encode_options(radius: :binary.copy(<<0>>, 2_048_000))
 
-    assert Order.encode(new(code: code)) ==
-             {:error, "Ours.Gather: expected code of at most 128 kB, got 128 kB"}
+    assert Order.encode(new(options: zeros)) ==
+             {:error, "options: expected data of at most 64 kB, without processes and functions"}
 
-    # Zeros take no room on their way.
-    zeros = [{"Elixir.Ours.Gather", :binary.copy(<<0>>, 2_048_000)}]
-
-    assert Order.encode(new(code: zeros)) ==
-             {:error, "Ours.Gather: expected code of at most 1000 kB, unpacked, got 2000 kB"}
-
-    order = new(code: zeros)
-    term = {1, order.id, order.from, order.to, order.mission, order.options, order.code}
+    order = new(options: zeros)
+    term = {2, order.id, order.from, order.to, order.mission, order.options}
     assert Order.decode(:erlang.term_to_binary(term, [:compressed])) == :error
   end
 
@@ -103,16 +94,5 @@ defmodule Swarm.Replacement.OrderTest do
 
     for wrong <- [other, nil, "", binary_part(mac, 0, 31), mac <> "a", 7, <<1::1>>],
         do: refute(Order.same?(mac, wrong))
-  end
-
-  test "the digest is that of what is executed, whatever the order of the modules" do
-    [{module, beam}] = Code.compile_string("defmodule Swarm.OrderTestCode, do: def(a, do: 1)")
-    {:ok, {^module, stripped}} = :beam_lib.strip(beam)
-    name = Atom.to_string(module)
-    digest = Order.digest(new(code: [{name, beam}, {"x", "y"}]))
-    assert digest =~ ~r/^[0-9a-f]{8}$/
-    assert Order.digest(new(code: [{"x", "y"}, {name, stripped}])) == digest
-    refute Order.digest(new(code: [{"x", "z"}, {name, beam}])) == digest
-    assert Order.digest(new()) == nil
   end
 end
