@@ -29,7 +29,6 @@ defmodule Sim.ReplacementTest do
     end
   end
 
-  defp states, do: for(id <- @ids, do: Swarm.status(id))
   defp drive?, do: Enum.any?(@ids, &(speed(&1) > 0.1))
 
   setup do
