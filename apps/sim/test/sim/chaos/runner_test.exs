@@ -132,7 +132,8 @@ defmodule Sim.Chaos.RunnerTest do
     assert %{played.options | mission: nil} == %{drawn.options | mission: nil}
   end
 
-  # The goal is that 99 % of all claims are true, and `mix chaos` judges by it. It is missed by little (docs/results.md); here it must not get worse. One seed has some 70 claims, of which two would decide; five have 330.
+  # The goal is that 99 % of all claims are true, and `mix chaos` judges by it. It is missed by little (docs/results.md);
+  # here it must not get worse. One seed has some 70 claims, of which two would decide; five have 330.
   # `CHAOS_RUNS=100` plays more.
   @tag :long
   @tag timeout: :infinity
