@@ -138,7 +138,9 @@ defmodule Sim.Check.Expectation do
   def asked(expectation) do
     {kind, {_name, values, keys}} = row(expectation)
     whole? = keys == [] or tuple_size(expectation) > length(values) + 1
-    {kind, if(whole?, do: expectation, else: Tuple.append(expectation, []))}
+
+    {kind,
+     if(whole?, do: expectation, else: Tuple.insert_at(expectation, tuple_size(expectation), []))}
   end
 
   defp row(expectation),
