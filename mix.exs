@@ -106,11 +106,11 @@ defmodule Convoy.MixProject do
   defp releases do
     robot =
       Keyword.new(
-        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :mcap],
+        [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :agents, :mcap],
         &{&1, :permanent}
       )
 
-    fleet = robot ++ [sim: :permanent, console: :permanent]
+    fleet = robot ++ [sim: :permanent, lab: :permanent, console: :permanent]
 
     [
       robot: Convoy.Release.options(applications: robot),

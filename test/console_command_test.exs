@@ -9,7 +9,7 @@ defmodule ConsoleCommandTest do
   @root Path.expand("..", __DIR__)
   @robots """
   Logger.configure(level: :none)
-  {:ok, _fleet} = Sim.Fleet.start_link(robots: [:mag1, :min1], mission: false)
+  {:ok, _fleet} = Lab.Fleet.start_link(robots: [:mag1, :min1], mission: false)
   receive(do: (:never -> :ok))
   """
 

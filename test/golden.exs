@@ -43,10 +43,10 @@ defmodule Golden do
 
   defp line(line) do
     [_digest, text] = String.split(line, "  ", parts: 2)
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     {:ok, options} = text |> String.split() |> Options.parse()
-    {:ok, trial} = options |> Options.trial() |> Sim.Trial.new()
-    report = trial |> Sim.Run.play() |> Sim.Trial.result() |> Report.json(0.0)
+    {:ok, trial} = options |> Options.trial() |> Lab.Trial.new()
+    report = trial |> Lab.Run.play() |> Lab.Trial.result() |> Report.json(0.0)
     {line, "#{digest(report)}  #{text}"}
   end
 

@@ -2,8 +2,8 @@ defmodule System.ScenariosTest do
   @moduledoc "All scenarios of test/scenarios hold, side by side."
   use ExUnit.Case, async: true
   alias Console.Scenario.Report
-  alias Sim.Scenario
-  alias Sim.Scenario.Runner
+  alias Lab.Scenario
+  alias Lab.Scenario.Runner
 
   @files Path.wildcard(Path.expand("scenarios/*.exs", __DIR__))
 
@@ -27,7 +27,7 @@ defmodule System.ScenariosTest do
   end
 
   defp failed(file) do
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     {:ok, scenario} = Scenario.File.load(file)
     {:ok, _result, verdicts} = Runner.run(scenario)
 

@@ -15,7 +15,7 @@ defmodule Console.MixProject do
       compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env()),
       test_ignore_filters: Convoy.Support.files(),
       start_permanent: Mix.env() == :prod,
-      deps: [{:sim, in_umbrella: true}]
+      deps: [{:lab, in_umbrella: true}]
     ]
   end
 

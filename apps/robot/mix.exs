@@ -16,14 +16,10 @@ defmodule Robot.MixProject do
       compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
       test_ignore_filters: Convoy.Support.files(),
       native: [
-        nifs: [
-          grid: ["grid.c", "grid_nif.c"],
-          occupancy: ["occupancy.c", "occupancy_nif.c"],
-          silhouettes: ["silhouettes.c", "silhouettes_nif.c"]
-        ]
+        nifs: [silhouettes: ["silhouettes.c", "silhouettes_nif.c"]]
       ],
       start_permanent: Mix.env() == :prod,
-      deps: [{:hal, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]
+      deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]
     ]
   end
 

@@ -19,7 +19,7 @@ defmodule Sim.MixProject do
         nifs: [kernel: ["rays.c", "paint.c", "regions.c", "kernel_nif.c"]]
       ],
       start_permanent: Mix.env() == :prod,
-      deps: [{:missions, in_umbrella: true}, {:mcap, in_umbrella: true}, {:vm, in_umbrella: true}]
+      deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}]
     ]
   end
 

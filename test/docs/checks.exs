@@ -105,7 +105,7 @@ defmodule Docs.Checks do
     "wishes, the strongest first:",
     "   40.0 s  FAILED  {:formed, by_s: 40}",
     "console -> sim -> missions -> swarm",
-    "console --> sim --> missions --> swarm",
+    "console --> lab --> missions --> swarm",
     "Swarm.Supervisor (rest_for_one",
     "camera -> Hal.Device",
     "idle -> search -> agree",

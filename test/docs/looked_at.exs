@@ -129,7 +129,7 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :vision, :robot, :mesh, :swarm, :missions, :agents, :sim, :mcap, :vm],
+        [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :agents, :sim, :lab, :mcap, :vm],
         &Application.spec(&1, :modules)
       )
 

@@ -180,7 +180,7 @@ defmodule Netns.Fleet do
     mesh = mesh(s.net, robot)
     # Together, so that the missions are there when the mesh begins: it must know their atoms.
     config = [logger: [level: :none], swarm: [missions: missions, mesh: mesh]]
-    :ok = Vm.start_apps(node, [:sim], config)
+    :ok = Vm.start_apps(node, [:lab], config)
     :ok = Vm.call(node, Netns.Robot, :start, [robot, poses, s.folder], @boot_ms)
   end
 

@@ -200,7 +200,7 @@ end
 
 defmodule Netns.Robot do
   @moduledoc "A whole robot on a node of its own, in a world of bodies."
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Sim.World
 
   @landmark {0.0, 0.0}

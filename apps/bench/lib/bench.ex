@@ -101,7 +101,7 @@ defmodule Bench do
     for case <- cases, case.deed == nil, Map.take(case.options, own) == %{}, do: case
   end
 
-  @doc "The options of `Sim.Trial.new/1` for a case, a map and a seed."
+  @doc "The options of `Lab.Trial.new/1` for a case, a map and a seed."
   @spec options(case(), String.t(), integer(), :painted | :direct) :: map()
   def options(case, map, seed, blobs) do
     limit_s = limit_s(case, map)

@@ -20,7 +20,7 @@ defmodule Missions do
       iex> {phase, goal}
       {:driven, {Robot.Behaviour.Move, [linear: 0.3, turn: 0.0, for_ms: 300.0]}}
 
-  `Robot.Control.Pilot` runs it on a robot, `Sim.Trial` in a simulation, `Robot.MissionCase` in a test: the same lines.
+  `Robot.Control.Pilot` runs it on a robot, `Lab.Trial` in a simulation, `Lab.MissionCase` in a test: the same lines.
 
   Go on with `docs/missions.md`, from an empty file to a mission of your own, and with `Missions.Teleop`, the shortest one.
   """

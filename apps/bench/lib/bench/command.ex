@@ -40,7 +40,7 @@ defmodule Bench.Command do
   end
 
   defp alone(job, measure) do
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     {job, measure.(job)}
   end
 

@@ -3,12 +3,12 @@ defmodule Bench.Explore do
   Measures one exploration of a map that the robots do not know, and what of it they have seen at which time: `mix bench
   explore`. In lockstep with default noise; all of it follows from map, number of robots and seed.
 
-  The area, and what of it is seen: `Sim.Trial.Coverage`.
+  The area, and what of it is seen: `Lab.Trial.Coverage`.
   """
   alias Hal.Pose
-  alias Robot.Navigation.Grid
-  alias Sim.{Run, Trial}
-  alias Sim.Trial.Coverage
+  alias Nav.Grid
+  alias Lab.{Run, Trial}
+  alias Lab.Trial.Coverage
   alias Swarm.Member
 
   @share 0.95

@@ -4,9 +4,9 @@ defmodule Bench.Goto do
   with default noise, from a random free pose to a random place that a way leads to; all of it follows from map and seed.
   """
   alias Hal.Pose
-  alias Robot.Navigation.{Grid, Reach}
-  alias Sim.{Run, Trial}
-  alias Sim.Trial.Setup
+  alias Nav.{Grid, Reach}
+  alias Lab.{Run, Trial}
+  alias Lab.Trial.Setup
   alias Swarm.Member
 
   # It counts as there if it truly is so near to the goal (metres): 0.1 is what it aims at by its own estimate.

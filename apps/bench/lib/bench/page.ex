@@ -40,14 +40,14 @@ defmodule Bench.Page do
   end
 
   defp fleet(robots, vm, given, note) do
-    with {:ok, fleet} <- Sim.Fleet.start_link(robots: robots, blobs: :direct),
+    with {:ok, fleet} <- Lab.Fleet.start_link(robots: robots, blobs: :direct),
          {:ok, page, url} <- Page.start_link(module: Live.Fleet, live: fleet, robots: robots) do
       note.("the fleet forms")
-      formed(fn -> Sim.Fleet.scene(fleet).formed? end, Hal.Clock.now_ms() + @form_ms)
+      formed(fn -> Lab.Fleet.scene(fleet).formed? end, Hal.Clock.now_ms() + @form_ms)
       boards = Enum.map(robots, &Board.find!/1)
       turns = turns(vm, url, given, note, &steady(boards, &1))
       :ok = Supervisor.stop(page)
-      :ok = Sim.Fleet.stop(fleet)
+      :ok = Lab.Fleet.stop(fleet)
       {:ok, turns}
     end
   end
@@ -56,7 +56,7 @@ defmodule Bench.Page do
     with {:ok, options} <-
            Console.Options.parse(["--robots", "#{length(robots)}", "--blobs", "direct"]),
          {:ok, live} <-
-           Live.Trial.start_link(Sim.Trial, Console.Options.trial(options), Live.Pace.new(:max)),
+           Live.Trial.start_link(Lab.Trial, Console.Options.trial(options), Live.Pace.new(:max)),
          {:ok, page, url} <- Page.start_link(module: Live.Trial, live: live, robots: robots) do
       note.("the fleet forms in lockstep")
       formed(fn -> Live.Trial.scene(live).formed? end, Hal.Clock.now_ms() + @form_ms)

@@ -4,7 +4,7 @@ defmodule Bench.Recording do
   processor time of the whole VM and in wall time. Both look at the scene of each tick, as the demo does.
   """
   alias Bench.Table
-  alias Sim.{Recorder, Run, Trial}
+  alias Lab.{Recorder, Run, Trial}
 
   @typedoc "A run: processor time and wall time in ms, ticks, and the recording's bytes."
   @type run :: %{

@@ -10,7 +10,7 @@ defmodule Bench.Run do
   @typedoc """
   `formed_s` is `nil` if the fleet did not form (again) before its time was up. `claims` are all
   claims of the run, including those before the intervention; `stuck` counts robots that stood
-  short of their places without reporting it (`Sim.Trial.Stuck`).
+  short of their places without reporting it (`Lab.Trial.Stuck`).
   """
   @type measured :: %{
           formed_s: float() | nil,
@@ -19,7 +19,7 @@ defmodule Bench.Run do
           collisions: non_neg_integer(),
           leaders: non_neg_integer(),
           changes: non_neg_integer(),
-          claims: [Sim.Trial.Claims.claim()],
+          claims: [Lab.Trial.Claims.claim()],
           stuck: non_neg_integer(),
           speed: float()
         }

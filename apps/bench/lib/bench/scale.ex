@@ -3,7 +3,7 @@ defmodule Bench.Scale do
   Measures what a robot costs in fleets of different sizes: `mix bench scale`. A run in lockstep, from the search on and in a
   process of its own, is measured in what all robots together took, divided by their number and that of the steps (100 ms).
   """
-  alias Sim.Trial
+  alias Lab.Trial
 
   @typedoc """
   Of one fleet: the reductions of the VM and the processor time for a robot in a step, the speed against real time, and
@@ -17,7 +17,7 @@ defmodule Bench.Scale do
           bytes: pos_integer()
         }
 
-  @doc "Measures one fleet for so many simulated seconds; the error is one line of `Sim.Trial.new/1`."
+  @doc "Measures one fleet for so many simulated seconds; the error is one line of `Lab.Trial.new/1`."
   @spec measure(pos_integer(), :painted | :direct, pos_integer()) ::
           {:ok, measured()} | {:error, line :: String.t()}
   def measure(robots, blobs, seconds) do

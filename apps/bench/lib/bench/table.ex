@@ -1,7 +1,7 @@
 defmodule Bench.Table do
   @moduledoc "Formats measured runs as a table in Markdown. Pure."
   alias Console.Cli.Format
-  alias Sim.Trial.Claims
+  alias Lab.Trial.Claims
 
   @heads [
     "case",
@@ -71,8 +71,8 @@ defmodule Bench.Table do
   @doc """
   How reliable the reports of the fleets were, as lines of text: how many claims of `formed` were
   true, all cases and maps pooled, and the worst case; how many robots were stuck and did not
-  report it (`Sim.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off
-  at the claim and 5 s later (`Sim.Trial.Claims`).
+  report it (`Lab.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off
+  at the claim and 5 s later (`Lab.Trial.Claims`).
   """
   @spec pooled([{String.t(), String.t(), number(), [Bench.Run.measured()]}]) :: String.t()
   def pooled(rows) do

@@ -2,14 +2,14 @@ defmodule Bench.GotoTest do
   use ExUnit.Case, async: true
   alias Bench.Goto
   alias Hal.Pose
-  alias Robot.Navigation.Reach
-  alias Sim.Trial.Setup
+  alias Nav.Reach
+  alias Lab.Trial.Setup
 
   test "a draw follows from map and seed; a way leads to its goal, and none is shorter than the straight line" do
     for {map, seed} <- [{"doorway", 3}, {"offices", 8}] do
       kind = Enum.at([:mag1, :min1], rem(seed, 2))
       options = %{robots: [kind], map: map, seed: seed, landmark: :none, plan: :known}
-      {:ok, setup} = Sim.Trial.setup(Map.put(options, :duration_s, 10))
+      {:ok, setup} = Lab.Trial.setup(Map.put(options, :duration_s, 10))
       assert {:ok, {from, goal, way_m}} = draw = Goto.draw(setup, kind, seed)
       assert Goto.draw(setup, kind, seed) == draw
 

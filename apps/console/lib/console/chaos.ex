@@ -3,8 +3,8 @@ defmodule Console.Chaos do
   alias Console.Chaos.{Options, Report}
   alias Console.Cli.{OutFile, Output, Progress}
   alias Console.Scenario.Recording
-  alias Sim.Chaos.{Draw, Runner, ScenarioFile}
-  alias Sim.Scenario
+  alias Lab.Chaos.{Draw, Runner, ScenarioFile}
+  alias Lab.Scenario
 
   @doc """
   Plays the runs and returns the exit status: 0 if nothing was wrong, 2 if something was, 1 if a file

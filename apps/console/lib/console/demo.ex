@@ -6,16 +6,17 @@ defmodule Console.Demo do
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Hal.Pose
-  alias Robot.Navigation.MapFile
-  alias Sim.{Recorder, Run, Scene, Trial}
-  alias Sim.Recording.{Facts, Pictures}
-  alias Sim.Trial.Coverage
+  alias Nav.MapFile
+  alias Lab.{Recorder, Run, Trial}
+  alias Sim.Scene
+  alias Lab.Recording.{Facts, Pictures}
+  alias Lab.Trial.Coverage
 
   # A fleet of more robots may be too large for real time.
   @large 20
 
   @doc """
-  Runs `options` with `Sim.Trial`, or `Sim.Fleet` in real time, and returns the exit status: 0 if the fleet
+  Runs `options` with `Lab.Trial`, or `Lab.Fleet` in real time, and returns the exit status: 0 if the fleet
   ended in formation, 2 if it did not, 1 if the run cannot be made, or ended before its time. Among
   the `hooks`, `lines` returns lines to print about the trial before it runs, `ended` says why it
   ended before its time (or `nil`), and `stop` ends what it leaves behind.
@@ -84,8 +85,8 @@ defmodule Console.Demo do
 
   defp slow(_real_time, _trial), do: ""
 
-  defp begin(Sim.Fleet, options) do
-    with {:ok, fleet} <- Sim.Fleet.start_link(Options.trial(options)), do: {:ok, fleet, nil, nil}
+  defp begin(Lab.Fleet, options) do
+    with {:ok, fleet} <- Lab.Fleet.start_link(Options.trial(options)), do: {:ok, fleet, nil, nil}
   end
 
   defp begin(module, %Options{record: nil, csv: nil} = options) do

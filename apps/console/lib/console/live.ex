@@ -37,7 +37,7 @@ defmodule Console.Live do
   @doc "Why the run has ended before its time, in one line; `nil` if it has not."
   @callback ended(live :: term()) :: String.t() | nil
 
-  @doc "The result for the report, as `Sim.Trial.result/1` returns it."
+  @doc "The result for the report, as `Lab.Trial.result/1` returns it."
   @callback result(live :: term()) :: map()
 
   @doc "Ends the fleet, and returns when nothing of it is left."

@@ -106,7 +106,7 @@ defmodule Console.Options do
     """
   end
 
-  @doc "The options for `Sim.Trial.new/1` and `Sim.Fleet.start_link/1`."
+  @doc "The options for `Lab.Trial.new/1` and `Lab.Fleet.start_link/1`."
   @spec trial(t()) :: map()
   def trial(%__MODULE__{} = options) do
     options
@@ -127,7 +127,7 @@ defmodule Console.Options do
   @spec real_time?(t()) :: boolean()
   def real_time?(%__MODULE__{nodes: nodes?, hardware: hardware}), do: nodes? or hardware != []
 
-  defp plan(%{plan: nil, mission: mission}), do: Sim.Trial.Options.plan(mission)
+  defp plan(%{plan: nil, mission: mission}), do: Lab.Trial.Options.plan(mission)
   defp plan(%{plan: plan}), do: plan
 
   @doc """
@@ -352,7 +352,7 @@ the prompt then takes pause, step, speed"},
   defp who(text), do: {:ok, text}
 
   defp pictures(text) do
-    {lowest, highest} = Sim.Recording.Pictures.rates()
+    {lowest, highest} = Lab.Recording.Pictures.rates()
     Parse.number(text, lowest, highest)
   end
 

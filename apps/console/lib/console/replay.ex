@@ -7,8 +7,8 @@ defmodule Console.Replay do
   alias Console.Cli.{Format, Output}
   alias Console.Replay.{Asked, Difference, Guard, Moment, Options, Recording, Session, Verdict}
   alias Console.Tables
-  alias Sim.Recording.Comparison
-  alias Sim.Replay.Kind
+  alias Lab.Recording.Comparison
+  alias Lab.Replay.Kind
 
   # So many differences are shown; the first ones explain the others.
   @shown 3

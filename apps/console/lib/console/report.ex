@@ -6,7 +6,7 @@ defmodule Console.Report do
   bytes, except for `wall_s`, the only key that depends on the machine.
   """
   alias Console.Cli.{Format, OutFile, Output}
-  alias Sim.Trial.Claims
+  alias Lab.Trial.Claims
 
   @version Mix.Project.config()[:version]
 

@@ -1,9 +1,9 @@
 defmodule Console.Tables do
   @moduledoc """
-  Writes the tables of a run or of a recording (`Sim.Recording.Tables`) into a folder, row by row as it goes. An error is
+  Writes the tables of a run or of a recording (`Lab.Recording.Tables`) into a folder, row by row as it goes. An error is
   kept, and told by `close/1`.
   """
-  alias Sim.Recording
+  alias Lab.Recording
   alias Sim.Scene
 
   @enforce_keys [:folder, :files]

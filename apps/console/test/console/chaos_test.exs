@@ -6,7 +6,7 @@ defmodule Console.ChaosTest do
   alias Console.Chaos.{Options, Report}
   alias Console.Scenario
   alias Console.Scenario.Session
-  alias Sim.Check.Violation
+  alias Lab.Check.Violation
 
   doctest Console.Chaos.Options
   doctest Console.Cli.Progress

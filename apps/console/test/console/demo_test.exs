@@ -24,7 +24,7 @@ defmodule Console.DemoTest do
   test "the first line says where the landmark stands if that was chosen, off the origin" do
     first = fn line ->
       options = Runs.options(line <> " --robots 1 --duration 1 --blobs direct --noise off")
-      {_status, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+      {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
       text |> String.split("\n") |> hd()
     end
 
@@ -44,7 +44,7 @@ defmodule Console.DemoTest do
     options =
       Runs.options("--map doorway --robots 2 --landmark none --duration 90 --blobs direct")
 
-    assert {2, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+    assert {2, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
     assert text =~ ~r/ mag1, min1: no landmark: has looked at all that it can reach, \d+ m²\./
   end
 
@@ -89,7 +89,7 @@ defmodule Console.DemoTest do
 
     line = "--headless --robots 1 --map doorway --landmark none --mission explore --duration 30"
     options = Runs.options(line <> " --blobs direct", words)
-    {_status, text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+    {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
     assert text =~ "Wrote #{options.save_map}"
     assert text =~ ~r/does not have what it wants: mag1 is not done \(\d+ m² explored, .+\)\./
 
@@ -100,7 +100,7 @@ defmodule Console.DemoTest do
                     100 * String.to_integer(seen) / String.to_integer(all),
                     1.0
 
-    assert {:ok, %{grid: grid}} = Robot.Navigation.MapFile.open(options.save_map)
+    assert {:ok, %{grid: grid}} = Nav.MapFile.open(options.save_map)
     assert {:ok, true_map} = Sim.Floorplan.open("doorway", 1)
     assert {:ok, found} = Sim.Floorplan.open(options.save_map, 1)
     {width, height} = Sim.Floorplan.size(true_map)
@@ -109,7 +109,7 @@ defmodule Console.DemoTest do
       for x <- 1..round(width * 5),
           y <- 1..round(height * 5),
           at = {x / 5 - width / 2, y / 5 - height / 2},
-          Robot.Navigation.Grid.clearance(grid, at) > 0.3,
+          Nav.Grid.clearance(grid, at) > 0.3,
           do: at
 
     assert length(free) > 100

@@ -60,7 +60,7 @@ defmodule Console.LiveFleetTest do
     end
 
     assert %{robots: 2, messages: %{sent: _}} = Live.Fleet.result(live)
-    Sim.Fleet.stop(live)
+    Lab.Fleet.stop(live)
     assert {:error, _line} = Live.Fleet.start_link(%{options | map: "nowhere"})
   end
 
@@ -116,6 +116,6 @@ defmodule Console.LiveFleetTest do
     end)
 
     assert :ok = Swarm.Case.order(fn -> Swarm.goto(:mag62, {1.0, 1.0}) end)
-    Sim.Fleet.stop(live)
+    Lab.Fleet.stop(live)
   end
 end

@@ -28,7 +28,7 @@ defmodule Console.LiveTest do
 
   test "robots answer in lockstep as they do live" do
     line = "--robots 2 --plan known --seed 3"
-    {:ok, live} = Live.Trial.start_link(Sim.Trial, Options.trial(Runs.options(line)))
+    {:ok, live} = Live.Trial.start_link(Lab.Trial, Options.trial(Runs.options(line)))
     assert {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
     tell = &Live.Trial.command(live, {:tell, &1, &2})
 

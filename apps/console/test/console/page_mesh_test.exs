@@ -121,7 +121,7 @@ defmodule Console.PageMeshTest do
       Browser.await(browser, "return window.floor.scene?.robots.length === 0")
       assert text(browser, "fleet") =~ "no robot is heard"
 
-      {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag41, :min41], mission: false)
+      {:ok, fleet} = Lab.Fleet.start_link(robots: [:mag41, :min41], mission: false)
       Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
       Browser.await(browser, "return window.floor.scene.robots.every((r) => r.x !== null)")
       Browser.await(browser, "return document.getElementById('fleet').className === ''")
@@ -173,7 +173,7 @@ defmodule Console.PageMeshTest do
         "return window.floor.scene.robots.every((r) => r.state !== 'E-STOP')"
       )
 
-      Sim.Fleet.stop(fleet)
+      Lab.Fleet.stop(fleet)
       Browser.await(browser, "return document.querySelectorAll('tr.dead').length === 2")
       assert text(browser, "robots") =~ "not heard"
       assert text(browser, "stages") =~ "mag41 is no longer heard"
@@ -186,7 +186,7 @@ defmodule Console.PageMeshTest do
       {:ok, live} = Live.Mesh.start_link()
       robots = fn -> Live.Mesh.robots(live) end
       {:ok, _page, url} = Page.start_link(module: Live.Mesh, live: live, robots: robots)
-      {:ok, fleet} = Sim.Fleet.start_link(robots: [:mag42, :min42], start: :same, mission: false)
+      {:ok, fleet} = Lab.Fleet.start_link(robots: [:mag42, :min42], start: :same, mission: false)
       browser = Browser.open({1280, 800})
       Browser.go(browser, url)
 
@@ -206,7 +206,7 @@ defmodule Console.PageMeshTest do
       assert text(browser, "doing") =~ "it was started again on its way, and is lost"
       assert Browser.errors(browser) == []
       Browser.close(browser)
-      Sim.Fleet.stop(fleet)
+      Lab.Fleet.stop(fleet)
     end
 
     defp until(true?, left \\ 100) do

@@ -17,10 +17,10 @@ defmodule Console.ReplayFuzzTest do
   setup %{tmp_dir: folder} do
     [run, live] = for name <- ["run.mcap", "live.mcap"], do: Path.join(folder, name)
     ticks = Runs.options("--headless --blobs direct --robots 3 --duration 6 --record", [run])
-    {_status, _text} = with_io(fn -> Demo.run(ticks, Sim.Trial) end)
+    {_status, _text} = with_io(fn -> Demo.run(ticks, Lab.Trial) end)
     alive = Runs.options("--headless --hardware 1 --robots 2 --duration 2 --record", [live])
-    stop = [stop: &Sim.Fleet.stop/1]
-    play = fn -> Live.Recording.run(alive, &Demo.run(&1, Sim.Fleet, stop)) end
+    stop = [stop: &Lab.Fleet.stop/1]
+    play = fn -> Live.Recording.run(alive, &Demo.run(&1, Lab.Fleet, stop)) end
     capture_io(:stderr, fn -> with_io(play) end)
     {:ok, path: Path.join(folder, "fuzz.mcap"), recorded: Enum.map([run, live], &messages/1)}
   end

@@ -4,7 +4,7 @@ defmodule Console.ReplayLiveTest do
   import ExUnit.CaptureIO
   alias Console.{Demo, Live, Options, Replay, Runs}
   alias Robot.Recording
-  alias Sim.Replay.{Cursor, Kind}
+  alias Lab.Replay.{Cursor, Kind}
   @moduletag :realtime
   @moduletag :tmp_dir
   @moduletag :capture_log
@@ -24,8 +24,8 @@ defmodule Console.ReplayLiveTest do
   defp record(path) do
     options = Runs.options("--headless --hardware 1 --robots 2 --duration 3", ["--record", path])
     assert Options.real_time?(options)
-    stop = [stop: &Sim.Fleet.stop/1]
-    heard(fn -> Live.Recording.run(options, &Demo.run(&1, Sim.Fleet, stop)) end)
+    stop = [stop: &Lab.Fleet.stop/1]
+    heard(fn -> Live.Recording.run(options, &Demo.run(&1, Lab.Fleet, stop)) end)
   end
 
   test "a live demo is recorded, and its robots replay one by one", %{tmp_dir: folder} do
@@ -121,7 +121,7 @@ defmodule Console.ReplayLiveTest do
   # The cursor is at each place what a replay is that only goes forwards; one effect that is lost is told once.
   defp differs(file) do
     ticks = Enum.to_list(Recording.File.ticks(file))
-    start = Sim.Replay.Robots.new(file)
+    start = Lab.Replay.Robots.new(file)
     {all, _last} = Enum.map_reduce(ticks, start, &forwards/2)
     from = fn ticks -> fn ms -> Enum.filter(ticks, &(elem(&1, 0) >= ms)) end end
     cursor = Cursor.new(start, from.(ticks), every: 4, most: 3)
@@ -309,7 +309,7 @@ defmodule Console.ReplayLiveTest do
 
     run = Path.join(folder, "run.mcap")
     demo = Runs.options("--headless --blobs direct --robots 1 --duration 1", ["--record", run])
-    with_io(fn -> Demo.run(demo, Sim.Trial) end)
+    with_io(fn -> Demo.run(demo, Lab.Trial) end)
 
     for {one, other, kinds} <- [
           {one, run, "#{one} is of live robots, #{run} is of a run in lockstep"},
@@ -344,10 +344,10 @@ defmodule Console.ReplayLiveTest do
   test "another version, and a file that cannot be made, are refused in one line", %{
     tmp_dir: folder
   } do
-    for {version, ours, other} <- [{1, 4, 3}, {99, 4, 3}] do
+    for {version, ours, other} <- [{1, 5, 4}, {99, 5, 4}] do
       path = written(folder, :erlang.term_to_binary({:convoy_robots, version, %{}}), [])
       run = Path.join(folder, "run.mcap")
-      {start, _ticks, encoding} = Sim.Recording.topics()
+      {start, _ticks, encoding} = Lab.Recording.topics()
       {writer, head} = Mcap.Writer.new([])
       {id, writer} = Mcap.Writer.channel(writer, start, encoding, nil)
       bytes = :erlang.term_to_binary({:convoy, version, %{}})

@@ -11,7 +11,7 @@ defmodule Console.ReplayTest do
   defp record(folder, name, line, words \\ []) do
     path = Path.join(folder, name)
     options = Runs.options("--headless --blobs direct " <> line, ["--record", path | words])
-    {_status, _text} = with_io(fn -> Demo.run(options, Sim.Trial) end)
+    {_status, _text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
     path
   end
 

@@ -1,6 +1,6 @@
 defmodule Console.FakeTrial do
   @moduledoc """
-  A stand-in for `Sim.Trial` with the same functions: robots that turn for five seconds, elect,
+  A stand-in for `Lab.Trial` with the same functions: robots that turn for five seconds, elect,
   and drive straight to their places. It exists so that the views are tested without a world.
   """
   alias Hal.Pose

@@ -69,10 +69,12 @@ defmodule Hal.Lines do
   @doc "Sends a signal to a process by its id."
   def kill(signal, pid), do: [] = :os.cmd(~c"kill -#{signal} #{pid}")
 
-  @doc "Looks again until it is so. For what ends without telling: programs, links."
+  @doc "Looks again until it is so, and returns what it saw. For what ends without telling: programs, links."
   def eventually(condition, left \\ 2_000) do
+    seen = condition.()
+
     cond do
-      condition.() -> :ok
+      seen -> seen
       left == 0 -> flunk("it did not come to pass")
       true -> receive(do: (:never -> :ok), after: (10 -> eventually(condition, left - 1)))
     end

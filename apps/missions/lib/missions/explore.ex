@@ -1,20 +1,20 @@
 defmodule Missions.Explore do
   @moduledoc """
   Explores: robots see all of a building that they do not know, and make its map together. Pure. Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
-  they estimate. Once a second it looks for the frontiers of what is known (`Robot.Navigation.Frontiers`), chooses one (`.Choice`), and tells
+  they estimate. Once a second it looks for the frontiers of what is known (`Nav.Frontiers`), chooses one (`.Choice`), and tells
   the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
 
   Its phases are `:explore`, and `:explored` while no frontier is left that it can reach; then it claims `formed`, unless
   too much of the edge of what it has seen is no wall: it has no room to get there, and says so. Before, it goes to the
-  walls of few echoes that close its ways (`Robot.Navigation.Survey.doubt/3`), and looks at them from nearby; where these
+  walls of few echoes that close its ways (`Nav.Survey.doubt/3`), and looks at them from nearby; where these
   were many, it says so and claims nothing. A place to which it came no nearer is left alone for a while, and for ever the
   second time. Options: `Missions.Explore.Options`.
   """
   alias Hal.Pose
   alias Missions.Explore.{Options, SharedMap}
-  alias Robot.Navigation.Frontiers
-  alias Robot.Navigation.Frontiers.Choice
+  alias Nav.Frontiers
+  alias Nav.Frontiers.Choice
 
   @behaviour Robot.Mission
 
@@ -70,7 +70,7 @@ defmodule Missions.Explore do
   `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
   `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
   when; `unknown` is the share of the edge of what was seen along which nothing is known
-  (`Robot.Navigation.Frontiers.unknown/1`), 1.0 while there are frontiers; `looked` are places where it has looked at a wall
+  (`Nav.Frontiers.unknown/1`), 1.0 while there are frontiers; `looked` are places where it has looked at a wall
   of few echoes, to one of which it goes if `doubts?`; `looked` are walls of few echoes at which it has looked, `doubts?`
   that it goes to one; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they
   go, and how far that is.

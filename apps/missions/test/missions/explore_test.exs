@@ -3,10 +3,10 @@ defmodule Missions.ExploreTest do
   alias Hal.{Odometry, Options, Pose, Profile, Twist}
   alias Missions.Explore
   alias Missions.Explore.SharedMap
-  alias Robot.Navigation.Frontiers
-  alias Robot.Navigation.Frontiers.Choice
+  alias Nav.Frontiers
+  alias Nav.Frontiers.Choice
   alias Robot.Mission.{Letter, Runner}
-  alias Robot.Navigation.Survey
+  alias Nav.Survey
   alias Robot.Percept
   doctest SharedMap
   doctest Choice

@@ -55,7 +55,7 @@ defmodule Missions.InterfaceTest do
   end
 
   test "all that the missions in the box call outside of themselves is in the guide's table, and nothing else is there" do
-    ours = Enum.flat_map([:hal, :robot, :vision, :mesh, :swarm], &modules/1)
+    ours = Enum.flat_map([:hal, :nav, :robot, :vision, :mesh, :swarm], &modules/1)
     allowed = allowed()
 
     called =

@@ -163,8 +163,8 @@ defmodule Swarm.MemberSpecTest do
     assert length(examples) > 25
     {:ok, colours} = Vision.Colours.read(Path.join(@robots, "landmark.txt"))
     read = fn "landmark.txt", _options -> {:ok, colours} end
-    grid = Robot.Navigation.Grid.new(<<0>>, {1, 1}, 1.0, {-0.5, -0.5})
-    map = fn file -> {:ok, %Robot.Navigation.MapFile{file: file, grid: grid}} end
+    grid = Nav.Grid.new(<<0>>, {1, 1}, 1.0, {-0.5, -0.5})
+    map = fn file -> {:ok, %Nav.MapFile{file: file, grid: grid}} end
 
     for {line, example} <- examples do
       changed = String.replace(text, line, example)

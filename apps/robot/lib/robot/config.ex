@@ -22,8 +22,8 @@ defmodule Robot.Config do
     * `:pace` - `:clock`, or `:manual`: gate and executive do not tick by themselves, but when
       they are sent `:step` and `:tick`, so that a test determines the order
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
-    * `:plan` - the walls of the building, `%Robot.Navigation.Grid{}` in the `map` frame, an empty
-      `Robot.Navigation.OccupancyGrid` for those that the sonars will have seen, or `nil` (the default) for none
+    * `:plan` - the walls of the building, `%Nav.Grid{}` in the `map` frame, an empty
+      `Nav.OccupancyGrid` for those that the sonars will have seen, or `nil` (the default) for none
     * `:fence` - a fence that the robot must not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
@@ -89,7 +89,7 @@ defmodule Robot.Config do
           clock: call(),
           pace: :clock | :manual,
           arm: :auto | :manual,
-          plan: Robot.Navigation.Grid.t() | Robot.Navigation.OccupancyGrid.t() | nil,
+          plan: Nav.Grid.t() | Nav.OccupancyGrid.t() | nil,
           fence: Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
@@ -168,7 +168,7 @@ defmodule Robot.Config do
     ]
   end
 
-  defp plan?(%module{}), do: module in [Robot.Navigation.Grid, Robot.Navigation.OccupancyGrid]
+  defp plan?(%module{}), do: module in [Nav.Grid, Nav.OccupancyGrid]
   defp plan?(plan), do: plan == nil
 
   @doc "How long a round of a robot's sonars may take at most, in seconds."

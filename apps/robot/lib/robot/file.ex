@@ -18,7 +18,7 @@ defmodule Robot.File do
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.{CrossChecks, Device, Reader, Schema, Terms}
-  alias Robot.Navigation.MapFile
+  alias Nav.MapFile
 
   @enforce_keys [:id, :profile, :drive]
   defstruct @enforce_keys ++
@@ -51,7 +51,7 @@ defmodule Robot.File do
           save_pictures: keyword() | nil,
           limits: keyword(float()),
           start: Pose.t(),
-          map: Robot.Navigation.MapFile.t() | nil,
+          map: Nav.MapFile.t() | nil,
           arm: :manual | :auto,
           fence: Robot.Fence.t() | nil,
           dry_run: boolean(),

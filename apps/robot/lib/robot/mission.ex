@@ -168,8 +168,8 @@ defmodule Robot.Mission do
   @doc "All phases, for files that name one. Without this callback: those of `c:roles/0`."
   @callback phases() :: [atom()]
 
-  @doc "The map that the mission has made so far, for a file (`Robot.Navigation.MapFile.save/2`)."
-  @callback map(mission :: term()) :: Robot.Navigation.MapFile.Writer.raster()
+  @doc "The map that the mission has made so far, for a file (`Nav.MapFile.save/2`)."
+  @callback map(mission :: term()) :: Nav.MapFile.Writer.raster()
 
   @optional_callbacks halted: 1,
                       options: 2,

@@ -73,8 +73,8 @@ defmodule Robot.Percept do
   `detections` are the blobs of the newest picture, `objects` the largest of each colour (`Robot.Percept.Sighting`), `nil`
   before the robot has looked. `driving` is the speed that the gate last let
   through, and the limits that it applied. `grid` is what the robot knows of
-  walls, by a floor plan or by its sonars (`Robot.Navigation.OccupancyGrid`), `nil` for nothing; `ways` is the floor plan
-  with what its sonars have seen besides (`Robot.Navigation.KnownWalls`), `nil` if that is nothing.
+  walls, by a floor plan or by its sonars (`Nav.OccupancyGrid`), `nil` for nothing; `ways` is the floor plan
+  with what its sonars have seen besides (`Nav.KnownWalls`), `nil` if that is nothing.
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -92,7 +92,7 @@ defmodule Robot.Percept do
           objects: Robot.Percept.Sighting.objects() | nil,
           peers: %{atom() => peer()},
           driving: %{twist: Twist.t(), limits: [atom()]} | nil,
-          grid: Robot.Navigation.Grid.t() | nil,
-          ways: Robot.Navigation.Grid.t() | nil
+          grid: Nav.Grid.t() | nil,
+          ways: Nav.Grid.t() | nil
         }
 end

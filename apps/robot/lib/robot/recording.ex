@@ -18,7 +18,7 @@ defmodule Robot.Recording do
   alias Robot.Replay
   alias Robot.Replay.Roles
 
-  @version 4
+  @version 5
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"

@@ -6,6 +6,6 @@ defmodule Robot.PureTest do
   doctest Robot.Safety.LivenessMonitor
   doctest Robot.Safety.Readiness
   doctest Robot.Behaviour.Arbiter
-  doctest Robot.Navigation.Steering
+  doctest Nav.Steering
   doctest Robot.Safety.Reflex.Body
 end

@@ -185,7 +185,7 @@ defmodule Robot.ReplayTest do
 
   test "the walls that the sonars see go to the pilot once each time that they change, and are replayed" do
     profile = Profile.magellan()
-    plan = Robot.Navigation.OccupancyGrid.new()
+    plan = Nav.OccupancyGrid.new()
     begin = begun(Executive, start: Pose.new(1, 2), plan: plan)
 
     # Along a wall at its left.
@@ -217,7 +217,7 @@ defmodule Robot.ReplayTest do
     {heard, %{runner: runner}, _} =
       recorded(:pilot, pilot, for(walls <- told, do: {:cast, walls}))
 
-    assert %Robot.Navigation.Grid{} = grid = runner.grid
+    assert %Nav.Grid{} = grid = runner.grid
     assert grid == Controller.walls(controller)
     assert {_, [], replay} = replay([{:pilot, :begin, pilot, 0} | heard])
     assert Replay.state(replay, :mag1, :pilot).runner.grid == grid
@@ -260,7 +260,7 @@ defmodule Robot.ReplayTest do
     for {version, more} <- [{2, [%{}]}, {99, [[], <<>>, 1]}] do
       message = List.to_tuple([:convoy_robots, version | more])
 
-      assert {:error, "is a recording of version #{version}; this program reads version 4"} ==
+      assert {:error, "is a recording of version #{version}; this program reads version 5"} ==
                Recording.read_robots(:erlang.term_to_binary(message))
     end
 
@@ -283,7 +283,7 @@ defmodule Robot.ReplayTest do
       bytes = :erlang.term_to_binary(robots)
 
       assert {:error, "begins with something" <> _} =
-               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 4, names, bytes}))
+               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 5, names, bytes}))
     end
 
     junk = [<<>>, "junk", <<131, 80, 0xFFFFFFFF::32, 0>>, :erlang.term_to_binary([{:mag1, 3}])]
@@ -299,7 +299,7 @@ defmodule Robot.ReplayTest do
     robot = <<119, 9, "rover7_ab">>
     <<131, state::binary>> = :erlang.term_to_binary(%{offset_ms: 5, profile: nil})
     robots = <<131, 116, 1::32, robot::binary, state::binary>>
-    told = &:erlang.term_to_binary({:convoy_robots, 4, &1, robots})
+    told = &:erlang.term_to_binary({:convoy_robots, 5, &1, robots})
 
     assert {:error, "begins with something" <> _} = Recording.read_robots(told.([]))
     assert {:ok, %{} = read, 998} = Recording.read_robots(told.(["rover7_ab", "base9_ab@hall"]))

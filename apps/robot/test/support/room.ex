@@ -3,7 +3,7 @@ defmodule Robot.Room do
   # A rectangular room for tests, its lower left corner at the origin: its floor plan, and what sonars hear in it, by the
   # geometry of its four walls alone.
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Percept
 
   @cell 0.05

@@ -7,7 +7,7 @@ defmodule Sim.Floorplan do
   cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
   jump over free space. `room` is the rectangle where a fleet starts.
   """
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Sim.Floorplan.{Cells, Clearance, Image, Landmark, Maps, Places, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
@@ -46,7 +46,7 @@ defmodule Sim.Floorplan do
   defp fields(error), do: error
 
   @doc "The walls as robots know them that have the floor plan."
-  @spec grid(t()) :: Robot.Navigation.Grid.t()
+  @spec grid(t()) :: Nav.Grid.t()
   def grid(%__MODULE__{} = map) do
     cells = for <<steps <- map.field>>, into: <<>>, do: if(steps == 0, do: <<1>>, else: <<0>>)
     corner = {-map.width * map.cell / 2, -map.height * map.cell / 2}

@@ -1,7 +1,5 @@
 defmodule Sim.DocTest do
   use ExUnit.Case, async: true
-  doctest Sim.Fleet.Mission
-  doctest Sim.Fleet.Said
   doctest Sim.World.Contact
   doctest Sim.Lateness
   doctest Sim.Floorplan
@@ -11,10 +9,7 @@ defmodule Sim.DocTest do
   doctest Sim.Floorplan.Shape
   doctest Sim.Noise
   doctest Sim.Compute.Palette
-  doctest Sim.Trial.Cuts
-  doctest Sim.Trial.Memory
   doctest Sim.Scene
   doctest Sim.Radio
-  doctest Sim.Trial.Options
   doctest Sim.Trig
 end

@@ -1,7 +1,7 @@
 defmodule Sim.EmulatorTest do
   @moduledoc "Emulated devices on real pseudo-terminals, in a world in real time; the test is their driver."
   use ExUnit.Case, async: true
-  import Swarm.Case, only: [eventually: 1]
+  import Hal.Lines, only: [eventually: 1]
   alias Hal.{Pose, Profile, Serial}
   alias Sim.{Emulator, World}
   @moduletag :realtime

@@ -2,7 +2,7 @@ defmodule Sim.FloorplanTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Sim.Floorplan
-  alias Robot.Navigation.MapFile.Png
+  alias Nav.MapFile.Png
 
   @moduletag :tmp_dir
   @signature <<0x89, "PNG\r\n", 0x1A, "\n">>

@@ -1,5 +1,5 @@
 defmodule Sim.PictureTest do
-  use Sim.LockstepCase, async: true
+  use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
   alias Sim.{Floorplan, World}
 

@@ -1,6 +1,6 @@
 defmodule Swarm.Member do
   @moduledoc """
-  Runs one robot of a fleet as one pure function: its roles, by `Robot.Lockstep`. `Sim.Trial` folds it in lockstep.
+  Runs one robot of a fleet as one pure function: its roles, by `Robot.Lockstep`. `Lab.Trial` folds it in lockstep.
 
   | input | from |
   |---|---|
@@ -46,7 +46,7 @@ defmodule Swarm.Member do
   A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
   `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `colours` (what its camera looks
   for, `Vision.Colours`; `nil` for a robot without), `plan` (the walls of a floor
-  plan, `Robot.Navigation.Grid`, or a `Robot.Navigation.OccupancyGrid` for those that its sonars will have seen), `order` (a
+  plan, `Nav.Grid`, or a `Nav.OccupancyGrid` for those that its sonars will have seen), `order` (a
   seed from which the order is drawn in which roles hear each other; `nil`: as they tell it).
   """
   @spec new(keyword()) :: t()

@@ -55,7 +55,7 @@ defmodule Swarm.CommsTest do
   end
 
   test "a robot that remembers walls by sonar is sent anywhere: it proves nothing beforehand" do
-    plan = Robot.Navigation.OccupancyGrid.new()
+    plan = Nav.OccupancyGrid.new()
     id = talking(:comms_sonar, plan: plan, start: Pose.new(1.0, 1.0))
     until(id, &match?({:ok, %Pose{}, _at_ms}, Board.fetch(&1, :pose, :infinity)))
     assert Swarm.goto(id, {3.0, 1.0}) == :ok
@@ -69,7 +69,7 @@ defmodule Swarm.CommsTest do
         if wall?, do: <<1>>, else: <<0>>
       end
 
-    plan = Robot.Navigation.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
+    plan = Nav.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
     id = talking(:comms_plan, plan: plan, start: Pose.new(1.0, 1.0))
     until(id, &match?({:ok, %Pose{}, _at_ms}, Board.fetch(&1, :pose, :infinity)))
 

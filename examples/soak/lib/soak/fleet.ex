@@ -8,7 +8,7 @@ defmodule Soak.Fleet do
   alias Soak.Fleet.{Keeper, Network}
   alias Soak.WorldHost
   alias Hal.Pose
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Sim.World
 
   @boot_ms 60_000

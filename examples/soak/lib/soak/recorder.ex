@@ -64,7 +64,7 @@ defmodule Soak.Recorder do
     {:noreply, %{s | ticks: s.ticks + 1, ticker: Ticker.next(s.ticker)}}
   end
 
-  defp claim(robot), do: robot |> Sim.Fleet.Robot.claim() |> Map.take([:phase, :leader, :epoch])
+  defp claim(robot), do: robot |> Lab.Fleet.Robot.claim() |> Map.take([:phase, :leader, :epoch])
 
   defp held(robot),
     do: with({:ok, board} <- Board.find(robot), do: Board.latched?(board), else: (:error -> nil))

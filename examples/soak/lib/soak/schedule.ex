@@ -10,7 +10,7 @@ defmodule Soak.Schedule do
   """
 
   alias Soak.Schedule.Draw
-  alias Sim.Chaos.Random
+  alias Lab.Chaos.Random
 
   @cycle_ms 75_000
   @busy 0.6

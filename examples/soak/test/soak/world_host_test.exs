@@ -2,7 +2,7 @@ defmodule Soak.WorldHostTest do
   use ExUnit.Case, async: true
   alias Soak.WorldHost
   alias Hal.{Pose, Twist}
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Sim.World
   alias Sim.World.Snapshot
 

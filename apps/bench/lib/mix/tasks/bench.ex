@@ -107,7 +107,7 @@ defmodule Mix.Tasks.Bench do
 
     named = fn {case, map, seed} -> "#{case.name} in #{map}, seed #{seed}" end
 
-    run = fn {case, map, seed} -> Bench.Run.run(case, map, seed, blobs, Sim.Trial) end
+    run = fn {case, map, seed} -> Bench.Run.run(case, map, seed, blobs, Lab.Trial) end
     results = Bench.Command.each(jobs, run, named)
     failed = for {job, {:error, line}} <- results, do: "#{named.(job)}: #{line}"
     rows = rows(results, cases, maps)

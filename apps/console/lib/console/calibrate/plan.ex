@@ -43,7 +43,7 @@ defmodule Console.Calibrate.Plan do
       iex> Console.Calibrate.Plan.name({:angle, -2 * :math.pi()})
       "360 degrees to the right"
   """
-  @spec name(Sim.Calibration.task()) :: String.t()
+  @spec name(Lab.Calibration.task()) :: String.t()
   def name({:distance, way}), do: "#{Format.decimals(way, 2)} m straight ahead"
   def name({:angle, turn}) when turn > 0, do: "#{degrees(turn)} degrees to the left"
   def name({:angle, turn}), do: "#{degrees(-turn)} degrees to the right"

@@ -7,7 +7,7 @@ defmodule Console.Calibrate.Question do
   @degree :math.pi() / 180
 
   @doc "The question of a course, and the check of its answer (`Console.Calibrate.StdinPrompt.ask/3`)."
-  @spec of(Sim.Calibration.task()) :: {String.t(), Console.Cli.Arguments.check()}
+  @spec of(Lab.Calibration.task()) :: {String.t(), Console.Cli.Arguments.check()}
   def of({:distance, way}),
     do:
       {"How far is it from its mark, in a straight line, in metres? ",
@@ -26,7 +26,7 @@ defmodule Console.Calibrate.Question do
        &Parse.point/1}
 
   @doc "The measurement: the pose at the end and the turn, as far as this course shows them."
-  @spec measured(Sim.Calibration.task(), float() | Pose.point()) :: %{
+  @spec measured(Lab.Calibration.task(), float() | Pose.point()) :: %{
           measured: Pose.t(),
           turn: float()
         }

@@ -4,7 +4,7 @@ defmodule Console.Calibrate.Simulated do
   alias Console.Calibrate.Report
   alias Console.Cli.{Format, Output, Progress}
   alias Robot.Calibration
-  alias Sim.Calibration, as: Simulated
+  alias Lab.Calibration, as: Simulated
 
   @goals %{distance: 0.005, base: 0.005, ratio: 0.002}
 

@@ -1,8 +1,8 @@
 defmodule Console.Chaos.Report do
   @moduledoc "Writes what `mix chaos` prints and writes of its runs. Pure."
   alias Console.Cli.Format
-  alias Sim.Chaos.Runner
-  alias Sim.Check.{Invariants, Violation}
+  alias Lab.Chaos.Runner
+  alias Lab.Check.{Invariants, Violation}
 
   @doc "The line of a failure: the run, what was wrong, and the command that plays it again; `words` are its options that draw (`Console.Chaos.Options.words/1`)."
   @spec failure(String.t(), Runner.failure()) :: String.t()

@@ -1,7 +1,7 @@
 defmodule Console.Cli.Format do
   @moduledoc "Formats events and figures of a fleet for people. Pure."
 
-  # What is done to a run by its script (`Sim.Trial.Interventions`).
+  # What is done to a run by its script (`Lab.Trial.Interventions`).
   @done %{
     landmark_removed: "the landmark is taken away",
     estop: "somebody presses the emergency stop of ROBOT",

@@ -7,7 +7,7 @@ defmodule Console.Live.Fleet do
   alias Console.Cli.Format
   alias Console.Page.About
   alias Robot.Command
-  alias Sim.Fleet
+  alias Lab.Fleet
 
   @doc "Starts a fleet; the error says in one line what is wrong with its options."
   @spec start_link(map()) :: {:ok, pid()} | {:error, String.t()}

@@ -1,10 +1,10 @@
 defmodule Console.Live.Recording do
   @moduledoc false
   # Records a live demo into one file: robots that are processes (`Robot.Recorder`), or a run in
-  # lockstep that is watched (`Sim.Recorder`).
+  # lockstep that is watched (`Lab.Recorder`).
   alias Console.Cli.Output
   alias Console.Options
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
 
   @doc """
   Runs `play` with the options, whose robots hand on what they are told and do if it is to be
@@ -46,11 +46,11 @@ defmodule Console.Live.Recording do
   @spec lockstep(Options.t(), (Options.t(), Setup.t(), recorder :: pid() -> 0 | 1 | 2)) ::
           0 | 1 | 2
   def lockstep(%Options{record: path} = options, play) do
-    with {:setup, {:ok, setup}} <- {:setup, Sim.Trial.setup(Options.trial(options))},
+    with {:setup, {:ok, setup}} <- {:setup, Lab.Trial.setup(Options.trial(options))},
          {:ok, recorder} <-
-           Sim.Recorder.start_link(path, setup, pictures: options.record_pictures != nil) do
+           Lab.Recorder.start_link(path, setup, pictures: options.record_pictures != nil) do
       status = play.(options, setup, recorder)
-      with(:ok <- Sim.Recorder.close(recorder), do: {:ok, 0}) |> told(options, status)
+      with(:ok <- Lab.Recorder.close(recorder), do: {:ok, 0}) |> told(options, status)
     else
       {:setup, {:error, line}} -> say(line)
       {:error, line} -> refuse(line)

@@ -13,7 +13,7 @@ defmodule Console.Live.Trial do
   alias Console.Page.About
   alias Console.Prompt
   alias Robot.Command
-  alias Sim.{Recorder, Trial}
+  alias Lab.{Recorder, Trial}
   alias Swarm.Commands
   alias Swarm.Missions.Text
   @behaviour Console.Live
@@ -32,10 +32,10 @@ defmodule Console.Live.Trial do
   end
 
   @doc """
-  Starts the run with this start, which a recorder records step by step (`Sim.Recorder`), with so
+  Starts the run with this start, which a recorder records step by step (`Lab.Recorder`), with so
   many pictures a second of each robot (`nil`: none).
   """
-  @spec start_recorded(Sim.Trial.Setup.t(), Pace.t(), recorder :: pid(), number() | nil) ::
+  @spec start_recorded(Lab.Trial.Setup.t(), Pace.t(), recorder :: pid(), number() | nil) ::
           {:ok, pid()}
   def start_recorded(setup, pace, recorder, pictures \\ nil) do
     trial = Trial.begin(setup, record: true, keep: @kept)
@@ -82,7 +82,7 @@ defmodule Console.Live.Trial do
 
   @impl GenServer
   def init({module, trial, pace, recorder}) do
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     # Steps that were ordered at another pace are not made: theirs is another tick.
     s = %{
       module: module,

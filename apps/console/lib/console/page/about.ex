@@ -5,7 +5,7 @@ defmodule Console.Page.About do
   alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names, Percept}
   alias Robot.Control.Controller
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Swarm.{Member, Status}
   alias Swarm.Status.Sight
 

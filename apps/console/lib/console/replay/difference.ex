@@ -2,8 +2,8 @@ defmodule Console.Replay.Difference do
   @moduledoc "Finds where a replay differs from its recording, or one recording from another, for people. Pure."
   alias Console.Cli.Format
 
-  @doc "A difference of a replay (`t:Sim.Replay.Kind.difference/0`), line by line."
-  @spec lines(Sim.Replay.Kind.difference()) :: [String.t()]
+  @doc "A difference of a replay (`t:Lab.Replay.Kind.difference/0`), line by line."
+  @spec lines(Lab.Replay.Kind.difference()) :: [String.t()]
   def lines({:decision, difference}) do
     role = if difference[:role], do: ", #{difference.role}", else: ""
     now = difference[:crash] || brief(difference.replayed -- difference.recorded)
@@ -27,7 +27,7 @@ defmodule Console.Replay.Difference do
     do: ["#{at(at_ms)} #{robot} was told something, but is not there"]
 
   @doc "Where two recordings part."
-  @spec parted(Sim.Recording.Comparison.difference()) :: [String.t()]
+  @spec parted(Lab.Recording.Comparison.difference()) :: [String.t()]
   def parted(%{at_ms: at_ms, entries: {one, other}}) do
     ["The two part in the tick that ends at #{at(at_ms)}:", "  one:   #{entry(one)}"] ++
       ["  other: #{entry(other)}"] ++ detail(one, other)

@@ -2,7 +2,7 @@ defmodule Console.Replay.Moment do
   @moduledoc "Describes how the fleet of a replay stood at its last tick, and why a robot did what it did. Pure."
   alias Console.Cli.Format
   alias Console.Replay.{Options, Why}
-  alias Sim.Replay.Kind
+  alias Lab.Replay.Kind
 
   @typedoc "The replay after its last tick and before it, and that tick."
   @type run :: %{

@@ -4,7 +4,7 @@ defmodule Console.Replay.Recording do
   alias Console.Cli.Format
   alias Console.Replay.Guard
   alias Robot.Recording, as: Robots
-  alias Sim.Replay.Kind
+  alias Lab.Replay.Kind
 
   @enforce_keys [:file, :about, :from, :options, :begin]
   defstruct @enforce_keys
@@ -14,7 +14,7 @@ defmodule Console.Replay.Recording do
   `begin` all of the start that must be the same in both.
   """
   @type t :: %__MODULE__{
-          file: Sim.Recording.File.t() | Robots.File.t(),
+          file: Lab.Recording.File.t() | Robots.File.t(),
           about: String.t(),
           from: String.t(),
           options: map(),
@@ -24,10 +24,10 @@ defmodule Console.Replay.Recording do
   @doc "Opens a file; the error is one line that names it."
   @spec open(Path.t()) :: {:ok, t()} | {:error, line :: String.t()}
   def open(path) do
-    Sim.Recording.File.know()
+    Lab.Recording.File.know()
 
     with :other <- Robots.File.open(path),
-         {:ok, file} <- Sim.Recording.File.open(path) do
+         {:ok, file} <- Lab.Recording.File.open(path) do
       {:ok, lockstep(file)}
     else
       {:ok, %Robots.File{} = file} -> {:ok, robots(file)}
@@ -89,9 +89,9 @@ defmodule Console.Replay.Recording do
   @doc "The start of a replay; of robots of processes that of one alone, if it is named."
   @spec replay(t(), only :: String.t() | nil) :: Kind.t()
   def replay(%__MODULE__{file: %Robots.File{} = file}, only),
-    do: Sim.Replay.Robots.new(file, only)
+    do: Lab.Replay.Robots.new(file, only)
 
-  def replay(%__MODULE__{file: file}, _only), do: Sim.Replay.new(file.setup)
+  def replay(%__MODULE__{file: file}, _only), do: Lab.Replay.new(file.setup)
 
   @doc "Whether two are of one kind; the error is one line."
   @spec alike(t(), t()) :: :ok | {:error, line :: String.t()}

@@ -4,7 +4,7 @@ defmodule Console.Replay.Session do
   # tick, and why. Reads commands (`Console.Replay.Command`) from standard input, a terminal or not, until its end.
   alias Console.Cli.{Format, Output, Progress}
   alias Console.Replay.{Command, Difference, Moment, Options, Recording, Verdict}
-  alias Sim.Replay.{Cursor, Kind}
+  alias Lab.Replay.{Cursor, Kind}
 
   # Long ways are gone in parts, and a terminal shows how far.
   @part_ms 5_000

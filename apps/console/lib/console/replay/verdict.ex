@@ -2,7 +2,7 @@ defmodule Console.Replay.Verdict do
   @moduledoc "Describes what came of a replay, line by line, and as an exit status. Pure."
   alias Console.Cli.Format
   alias Console.Replay.Difference
-  alias Sim.Replay.Kind
+  alias Lab.Replay.Kind
 
   @doc "Whether something could not be compared, because it was not recorded."
   @spec gaps?(Kind.compared()) :: boolean()

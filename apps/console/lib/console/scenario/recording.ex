@@ -2,8 +2,8 @@ defmodule Console.Scenario.Recording do
   @moduledoc false
   # Records the run of a scenario for `mix replay`. The run is made again: the same scenario gives the same run, so
   # runs that are not looked at are not recorded.
-  alias Sim.{Recorder, Scenario, Trial}
-  alias Sim.Scenario.Runner
+  alias Lab.{Recorder, Scenario, Trial}
+  alias Lab.Scenario.Runner
 
   @doc "Writes the recording of the whole run; the error is one line."
   @spec record(Scenario.t(), Path.t()) :: :ok | {:error, String.t()}

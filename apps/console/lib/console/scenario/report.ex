@@ -2,8 +2,8 @@ defmodule Console.Scenario.Report do
   @moduledoc "Writes what `mix scenario` prints about a run, as lines. Pure."
   alias Console.Cli.Format
   alias Console.Fleet
-  alias Sim.{Check, Scenario}
-  alias Sim.Scenario.Text
+  alias Lab.{Check, Scenario}
+  alias Lab.Scenario.Text
 
   @doc "The first lines: the file, what it is for, and the robots."
   @spec heading(Path.t(), Scenario.t(), %{:options => map(), optional(atom()) => term()}) ::

@@ -4,8 +4,9 @@ defmodule Console.Scenario.Session do
   # printed as a whole in the order of the arguments; in real time one after the other.
   alias Console.Cli.{Format, Output}
   alias Console.Scenario.{Options, Recording, Report}
-  alias Sim.{Run, Scenario, Scene}
-  alias Sim.Scenario.Runner
+  alias Lab.{Run, Scenario}
+  alias Sim.Scene
+  alias Lab.Scenario.Runner
 
   @doc """
   Reads all files before the first run. The status is 0 if all expectations hold, else 2; an error
@@ -73,7 +74,7 @@ defmodule Console.Scenario.Session do
   end
 
   defp play([run], options) do
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     alone(run, options)
   end
 
@@ -130,7 +131,7 @@ defmodule Console.Scenario.Session do
   end
 
   defp whole({file, {scenario, run}}) do
-    Sim.Trial.Memory.prepare()
+    Lab.Trial.Memory.prepare()
     heading = Report.heading(file, scenario, run.source)
     {run, nil} = Runner.play(scenario, run)
     {verdicts, last} = ended(file, run)

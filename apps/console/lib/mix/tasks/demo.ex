@@ -13,7 +13,7 @@ defmodule Mix.Tasks.Demo do
   use Mix.Task
   alias Console.{Demo, Live, Options, Report}
   alias Console.Terminal.Session
-  alias Sim.Fleet
+  alias Lab.Fleet
 
   # Twenty robots take a third of a processor, fifty a whole one, because all hear all.
   @robots_a_processor 20
@@ -58,8 +58,8 @@ defmodule Mix.Tasks.Demo do
         recorded(options, &Demo.run(&1, Fleet, paced()))
 
       options.headless ->
-        Sim.Trial.Memory.prepare(length(options.robots))
-        Demo.run(options, Sim.Trial)
+        Lab.Trial.Memory.prepare(length(options.robots))
+        Demo.run(options, Lab.Trial)
 
       true ->
         live(options)
@@ -70,7 +70,7 @@ defmodule Mix.Tasks.Demo do
     do: [lines: &Fleet.lines/1, ended: &Fleet.ended/1, stop: &Fleet.stop/1]
 
   defp lockstep(%{record: nil} = options, pace),
-    do: Session.run(options, Live.Trial, &Live.Trial.start_link(Sim.Trial, &1, pace))
+    do: Session.run(options, Live.Trial, &Live.Trial.start_link(Lab.Trial, &1, pace))
 
   defp lockstep(options, pace) do
     Live.Recording.lockstep(options, fn options, setup, recorder ->

@@ -1,13 +1,13 @@
 defmodule Missions.Explore.SharedMap do
   @moduledoc false
-  # Keeps the map of the fleet as one robot has it: what its own sonars have seen (`Robot.Navigation.Survey`), and where
+  # Keeps the map of the fleet as one robot has it: what its own sonars have seen (`Nav.Survey`), and where
   # these say nothing, what others told last. Pure.
   #
   # Robots tell each other tiles of 1.6 x 1.6 m, two bits a cell: those in which they have seen something new, and in turn a few
   # tiles of everything known, from any source, so latecomers catch up, and what a robot has told is not lost with it.
   alias Hal.Pose
-  alias Robot.Navigation.MapFile.Writer
-  alias Robot.Navigation.Survey
+  alias Nav.MapFile.Writer
+  alias Nav.Survey
   alias Robot.Percept
 
   @tile Survey.tile()
@@ -135,7 +135,7 @@ defmodule Missions.Explore.SharedMap do
     if map.tiles[at] == states, do: %{map | news: List.delete(map.news, at)}, else: map
   end
 
-  @doc "The same with the robot's own walls as unknown of which it has heard little (`Robot.Navigation.Survey.doubt/3`)."
+  @doc "The same with the robot's own walls as unknown of which it has heard little (`Nav.Survey.doubt/3`)."
   @spec doubted(t()) :: Writer.raster()
   def doubted(%__MODULE__{tiles: tiles, survey: survey} = map),
     do:

@@ -7,8 +7,8 @@ defmodule Missions.Landmark.Coverage do
   # walls a robot knows its floor plan, or what its sonars see; behind what these do not reach there may be a wall, so
   # without a plan only what is near counts.
   alias Hal.Pose
-  alias Robot.Navigation.{Grid, Survey}
-  alias Robot.Navigation.MapFile.Writer
+  alias Nav.{Grid, Survey}
+  alias Nav.MapFile.Writer
 
   @cell Survey.cell()
   # A landmark of 30 cm is a blob of 150 pixels at 8 m. Sonars are sure of walls to 3 m.
@@ -28,7 +28,7 @@ defmodule Missions.Landmark.Coverage do
   @doc """
   Adds what can be seen from a place, in the map frame.
 
-      iex> grid = Robot.Navigation.Grid.new(<<0::400>>, {10, 5}, 0.1, {0.0, 0.0})
+      iex> grid = Nav.Grid.new(<<0::400>>, {10, 5}, 0.1, {0.0, 0.0})
       iex> coverage = Missions.Landmark.Coverage.look(%Missions.Landmark.Coverage{}, grid, {0.25, 0.25})
       iex> Float.round(Missions.Landmark.Coverage.area(coverage), 2)
       0.5

@@ -4,7 +4,7 @@ defmodule Missions.Landmark.Lookout do
   # nearest place from which it sees what none has looked at, turns around there, and so on until the landmark is found or
   # nothing is left. Pure.
   #
-  # Places are frontiers (`Robot.Navigation.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
+  # Places are frontiers (`Nav.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
   # each other where they have turned and where they go, so that they go apart. A robot that knows nothing of walls has no
   # lookout: it wanders. `Missions.Landmark.Lookout.Legs` chooses among the places.
   alias Hal.Pose

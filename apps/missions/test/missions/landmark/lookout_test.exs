@@ -4,7 +4,7 @@ defmodule Missions.Landmark.LookoutTest do
   alias Hal.{Pose, Profile}
   alias Missions.Landmark
   alias Missions.Landmark.{Beat, Coverage, Lookout}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Percept
   doctest Coverage
 

@@ -167,6 +167,9 @@ defmodule Missions.Landmark.PartitionTest do
   end
 
   test "if one link of a triangle is cut for good, there is no second leader, and the anchor comes by the third robot" do
+    # At 20 % loss and two hops an anchor is late by 2 s once in some 100 draws; then a robot rightly asks for a round.
+    :rand.seed(:exsss, {1, 0, 0})
+
     for link <- [{:link, :mag2, :mag1}, {:link, :mag2, :mag3}, {:link, :mag1, :mag3}],
         loss <- [0.0, 0.2] do
       ids = [:mag1, :mag2, :mag3]

@@ -2,7 +2,7 @@ defmodule Missions.Landmark.ShapeTest do
   @moduledoc "What a leader that knows no walls makes of followers that are blocked."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Percept
   alias Missions.Landmark
   alias Missions.Landmark.{Beat, Shape}

@@ -4,7 +4,7 @@ defmodule Missions.Landmark.UnsureTest do
   """
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Profile, Twist}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Percept
   alias Swarm.EStop
   alias Missions.Landmark.Reference

@@ -3,7 +3,7 @@ defmodule Robot.Behaviour.Avoid do
   Runs another behaviour, and changes or slows its wishes so that the robot avoids contact.
 
   The velocity of a wish is changed: the robot drives round standing robots and discs on a short
-  route (`.Route`), past moving robots by `Robot.Navigation.Orca` (`.Clearance`), a little to the
+  route (`.Route`), past moving robots by `Nav.Orca` (`.Clearance`), a little to the
   right of oncoming ones, and away from bodies that are very close (`.Preference`). All wishes are
   slowed down near other robots (`.Brake`); one without a velocity is changed in no other way. A
   robot that makes no progress for some seconds leaves its route for a while (`.Progress`), and a
@@ -18,7 +18,7 @@ defmodule Robot.Behaviour.Avoid do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.{Percept, Wish}
-  alias Robot.Navigation.{Orca, Steering}
+  alias Nav.{Orca, Steering}
   alias Robot.Behaviour.Avoid
 
   alias Robot.Behaviour.Avoid.{

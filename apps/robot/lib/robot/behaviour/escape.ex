@@ -21,7 +21,7 @@ defmodule Robot.Behaviour.Escape do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
 
   # A robot that is blocked in front and behind gives up instead of pushing for ever.
   @give_up_ms 4000

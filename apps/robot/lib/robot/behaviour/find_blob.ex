@@ -11,7 +11,7 @@ defmodule Robot.Behaviour.FindBlob do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
   alias Robot.Percept.Sighting
 
   # How long a sighting is valid after the last picture that showed it.

@@ -14,7 +14,7 @@ defmodule Robot.Behaviour.Follow do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
 
   # Nearer than this (metres) it may drive backwards instead of turning round.
   @back_up 0.6

@@ -8,14 +8,14 @@ defmodule Robot.Behaviour.Goto do
   (metres, default 0.1), `heading_tolerance` (radians, default 0.05), `speed` (m/s, default the
   profile's). Outcome 1: arrived. Without a pose it stands and waits.
 
-  It gives up with outcome 0 if the walls that it knows leave no place or no way (`Robot.Navigation.Reach`), and with 2 if
+  It gives up with outcome 0 if the walls that it knows leave no place or no way (`Nav.Reach`), and with 2 if
   it has come no nearer for 15 s (`Robot.Behaviour.Patience`), which it learns from `Robot.Behaviour.Avoid`.
   """
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Behaviour.Patience
   alias Robot.Wish
-  alias Robot.Navigation.{Reach, Steering}
+  alias Nav.{Reach, Steering}
 
   @points_there 0.09
   @points_aside 0.26

@@ -22,7 +22,7 @@ defmodule Robot.Behaviour.TrackBlob do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
   alias Robot.Percept.{CameraPointing, Sighting}
 
   # Radians off the front at which the body begins to turn, with a pan-tilt unit and without one,

@@ -8,7 +8,7 @@ defmodule Robot.Behaviour.Velocity do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
 
   @still 0.03
 

@@ -14,7 +14,7 @@ defmodule Robot.Calibration.DriveCourse do
   @behaviour Robot.Behaviour
   alias Hal.{Options, Pose, Twist}
   alias Robot.Wish
-  alias Robot.Navigation.Steering
+  alias Nav.Steering
 
   @close_m 0.004
   @close_rad 0.008

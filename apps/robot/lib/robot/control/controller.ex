@@ -18,7 +18,7 @@ defmodule Robot.Control.Controller do
   alias Robot.{Localiser, Mission, Percept, Wish}
   alias Robot.Behaviour.Arbiter
   alias Robot.Percept.Sighting
-  alias Robot.Navigation.{Grid, KnownWalls}
+  alias Nav.{Grid, KnownWalls}
   alias Robot.Behaviour.{Avoid, Escape, Rest}
 
   @most_corners 50
@@ -60,7 +60,7 @@ defmodule Robot.Control.Controller do
   A controller without a goal. Options: `profile` (required), `start`, the pose in the map
   frame at which the odometry reads zero, with which the controller estimates the percept's pose by
   `Robot.Localiser`, and `departed`, see there; `plan`, the walls of a floor plan
-  (`Robot.Navigation.Grid`) in the map frame, or an empty `Robot.Navigation.OccupancyGrid` for those that its sonars will
+  (`Nav.Grid`) in the map frame, or an empty `Nav.OccupancyGrid` for those that its sonars will
   have seen; without either it knows none.
   """
   @spec new(keyword()) :: t()
@@ -145,7 +145,7 @@ defmodule Robot.Control.Controller do
 
   @doc """
   What a tick tells the mission: the walls that the robot knows, if they are others than `before`, packed
-  (`Robot.Navigation.Grid.Packed`); then the percept without them, because they are large and seldom change: the
+  (`Nav.Grid.Packed`); then the percept without them, because they are large and seldom change: the
   mission's runner keeps them (`Robot.Mission.Runner`).
   """
   @spec report(before :: t(), now :: t()) :: [

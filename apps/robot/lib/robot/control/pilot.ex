@@ -25,7 +25,7 @@ defmodule Robot.Control.Pilot do
   alias Robot.Localiser.Anchors
   alias Robot.Mission.Runner
   alias Robot.Safety.{Gate, Readiness}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   import Robot.Mission, only: [is_order: 1]
 
   # Generous, because a pilot may be slow on a busy machine.
@@ -98,7 +98,7 @@ defmodule Robot.Control.Pilot do
   def resume(robot), do: call(robot, :resume)
 
   @doc "The map that the mission has made, also one that was stopped; `nil` of one that makes none."
-  @spec map(robot :: atom()) :: Robot.Navigation.MapFile.Writer.raster() | nil
+  @spec map(robot :: atom()) :: Nav.MapFile.Writer.raster() | nil
   def map(robot), do: call(robot, :map)
 
   @doc "Hands a command to the mission. `:ok` means that the mission got it, not that it is done."

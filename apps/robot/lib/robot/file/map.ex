@@ -1,10 +1,10 @@
 defmodule Robot.File.Map do
   @moduledoc false
   # Reads the map of a robot file: the path of a description as map_server writes it, which is relative to the robot
-  # file's folder (`Robot.Navigation.MapFile`).
+  # file's folder (`Nav.MapFile`).
   alias Hal.Options.Type
   alias Hal.Pose
-  alias Robot.Navigation.{Grid, MapFile}
+  alias Nav.{Grid, MapFile}
 
   @what "the path of a floor plan's description, \"FILE.yaml\","
 
@@ -23,8 +23,8 @@ defmodule Robot.File.Map do
   @doc """
   Why a robot of this radius (metres) cannot start at this pose of a map: `nil` if it can.
 
-      iex> grid = Robot.Navigation.Grid.new(<<0, 0, 0, 1>>, {4, 1}, 0.5, {0.0, 0.0}, closed?: false)
-      iex> map = %Robot.Navigation.MapFile{file: "floor.yaml", grid: grid}
+      iex> grid = Nav.Grid.new(<<0, 0, 0, 1>>, {4, 1}, 0.5, {0.0, 0.0}, closed?: false)
+      iex> map = %Nav.MapFile{file: "floor.yaml", grid: grid}
       iex> for x <- [0.2, 1.7], do: Robot.File.Map.start(map, Hal.Pose.new(x, 0.2))
       [nil, "expected floor of the map floor.yaml, got {1.7, 0.2}: there is a wall"]
   """

@@ -6,7 +6,7 @@ defmodule Robot.File.Odd do
   """
   alias Hal.{Pose, Profile}
   alias Robot.File.Device
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   # The robots of the thesis reach full speed within 1 s.
   @slow_s 5.0

@@ -8,7 +8,7 @@ defmodule Robot.Localiser.InSight do
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   # A line that is nearer to a wall than this (metres) does not pass it.
   @beside 0.02

@@ -1,6 +1,6 @@
 defmodule Robot.Localiser.Walls do
   @moduledoc """
-  Corrects a belief by what the sonars hear of the walls of a floor plan (`Robot.Navigation.Grid`). Pure.
+  Corrects a belief by what the sonars hear of the walls of a floor plan (`Nav.Grid`). Pure.
 
   Every few decimetres each range is compared with that of the flat wall which its sonar should face squarely
   (`Robot.Localiser.Walls.Facing`), and is a measurement of the extended Kalman filter `Robot.Localiser.Belief` along the normal of
@@ -14,8 +14,8 @@ defmodule Robot.Localiser.Walls do
   alias Hal.Pose
   alias Robot.Localiser.Belief
   alias Robot.Localiser.Walls.{Facing, Trust}
-  alias Robot.Navigation.Grid
-  alias Robot.Navigation.OccupancyGrid.Cones
+  alias Nav.Grid
+  alias Nav.OccupancyGrid.Cones
   alias Robot.Percept
 
   # A round of readings is taken after so much way or turn (metres, radians).

@@ -9,7 +9,7 @@ defmodule Robot.Mission.Manual do
 
   Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
   (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why; from a door, or
-  where no robot gets past it, it goes aside (`Robot.Navigation.PassingPlace`). One that ends
+  where no robot gets past it, it goes aside (`Nav.PassingPlace`). One that ends
   where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
@@ -19,7 +19,7 @@ defmodule Robot.Mission.Manual do
   alias Hal.{Pose, Twist}
   alias Robot.{Command, Percept}
   alias Robot.Behaviour.Blocker
-  alias Robot.Navigation.{Grid, PassingPlace, Reach}
+  alias Nav.{Grid, PassingPlace, Reach}
 
   @behaviour Robot.Mission
 

@@ -9,7 +9,7 @@ defmodule Robot.Mission.Runner do
   alias Robot.{Mission, Percept}
   alias Robot.Localiser.Anchors
   alias Robot.Mission.{Claim, Letter}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   import Robot.Mission, only: [is_order: 1]
 
   # Radians: one that is far beyond any head.
@@ -107,7 +107,7 @@ defmodule Robot.Mission.Runner do
     do: if(function_exported?(module, :explain, 1), do: module.explain(mission), else: [])
 
   @doc "The map that the mission has made, also one that a stop has left; `nil` of one that makes none."
-  @spec map(t()) :: Robot.Navigation.MapFile.Writer.raster() | nil
+  @spec map(t()) :: Nav.MapFile.Writer.raster() | nil
   def map(%__MODULE__{module: nil, halted: nil}), do: nil
   def map(%__MODULE__{module: nil, halted: {module, mission}}), do: map(module, mission)
   def map(%__MODULE__{module: module, mission: mission}), do: map(module, mission)

@@ -2,10 +2,10 @@ defmodule Robot.Behaviour.AvoidTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Twist}
   alias Robot.Body
-  alias Robot.Navigation.{Orca, PathPlanner}
+  alias Nav.{Orca, PathPlanner}
   alias Robot.Behaviour.{Avoid, Follow, Goto, Move}
-  doctest Robot.Navigation.Orca
-  doctest Robot.Navigation.PathPlanner
+  doctest Nav.Orca
+  doctest Nav.PathPlanner
 
   defp any(size), do: {size * (2 * :rand.uniform() - 1), size * (2 * :rand.uniform() - 1)}
 

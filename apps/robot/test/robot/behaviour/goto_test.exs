@@ -4,7 +4,7 @@ defmodule Robot.Behaviour.GotoTest do
   alias Robot.Body
   alias Robot.Behaviour.{Blocker, Goto, Patience}
   alias Robot.Control.Controller
-  alias Robot.Navigation.{Grid, Reach}
+  alias Nav.{Grid, Reach}
   doctest Patience
   doctest Reach
   doctest Blocker

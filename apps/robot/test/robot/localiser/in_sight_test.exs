@@ -2,7 +2,7 @@ defmodule Robot.Localiser.InSightTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Robot.Localiser.{Belief, Frame, InSight}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   # A wall along x = 2 with a door of 1 m about y = 0.
   defp plan do

@@ -65,7 +65,7 @@ defmodule Robot.Localiser.MatchingTest do
           into: <<>>,
           do: if(i == 65 and j in 20..43, do: <<1>>, else: <<0>>)
 
-    plan = Robot.Navigation.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
+    plan = Nav.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
     hidden = robot(:mag2, {3.2, 0.0}, reference?: true)
     near = robot(:mag3, {3.0, 0.1}, reference?: true)
     blob = blob({3.0, 0.1})

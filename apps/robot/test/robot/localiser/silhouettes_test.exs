@@ -143,7 +143,7 @@ defmodule Robot.Localiser.SilhouettesTest do
   test "robots behind the walls of a plan are not missed" do
     # A wall from -4 to 4 at 2 m ahead, of one cell.
     cells = for _j <- 1..80, i <- 1..80, into: <<>>, do: if(i == 61, do: <<1>>, else: <<0>>)
-    plan = Robot.Navigation.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
+    plan = Nav.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: false)
 
     [first | _] = @column
     near = %{first | at: {1.5, 0.0}}

@@ -124,7 +124,7 @@ defmodule Robot.Mission.ManualTest do
           into: <<>>,
           do: if(i > 20 and j not in 6..13, do: <<1>>, else: <<0>>)
 
-    grid = Robot.Navigation.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
+    grid = Nav.Grid.new(cells, {50, 20}, 0.1, {0.0, 0.0})
 
     for {x, aside?} <- [{0.6, false}, {3.0, true}] do
       {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:4.5:1.0")
@@ -148,7 +148,7 @@ defmodule Robot.Mission.ManualTest do
     cells =
       for j <- 0..9, i <- 0..29, into: <<>>, do: if(i > 20 and j < 5, do: <<1>>, else: <<0>>)
 
-    grid = Robot.Navigation.Grid.new(cells, {30, 10}, 0.1, {0.0, 0.0})
+    grid = Nav.Grid.new(cells, {30, 10}, 0.1, {0.0, 0.0})
     {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2.5:0.2")
     {:given_up, mission, _claim} = Manual.handle({:outcome, tag, 0}, mission)
     percept = %{percept(100, %{}) | pose: Pose.new(0.5, 0.5), grid: grid}

@@ -2,8 +2,8 @@ defmodule Sim.Floorplan.Image do
   @moduledoc false
   # Reads maps from files: a PNG, PGM or BMP picture with its size in metres, `FILE:WIDTHxHEIGHT`, whose middle is the origin;
   # or a description in YAML as map_server writes it, `FILE.yaml`, which names the picture and says where the origin is.
-  alias Robot.Navigation.MapFile
-  alias Robot.Navigation.MapFile.{Picture, Turn}
+  alias Nav.MapFile
+  alias Nav.MapFile.{Picture, Turn}
   alias Sim.Compute
   alias Sim.Floorplan.Maps
 

@@ -3,7 +3,7 @@ defmodule Sim.Floorplan.Rooms do
   # Finds the rooms of a map: areas of places that are far enough from all walls to start there, so that a door ends a
   # room. Pure.
   alias Hal.Pose
-  alias Robot.Navigation.MapFile.Runs
+  alias Nav.MapFile.Runs
   alias Sim.Floorplan.Cells
 
   # A landmark has so much space around it if the room has; space that is lacking is as bad as a way

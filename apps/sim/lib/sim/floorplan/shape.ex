@@ -1,7 +1,8 @@
 defmodule Sim.Floorplan.Shape do
-  @moduledoc false
-  # Describes the shapes that the built-in maps are drawn with, and the part of a row that each covers. Pure. Only
-  # additions, multiplications, divisions and square roots, so that a map is the same on every machine.
+  @moduledoc """
+  Describes the shapes that the built-in maps are drawn with, and the part of a row that each covers. Pure. Only
+  additions, multiplications, divisions and square roots, so that a map is the same on every machine.
+  """
 
   @typedoc """
   Wall, or floor where there was wall; lengths are metres. A line has a thickness and flat ends.

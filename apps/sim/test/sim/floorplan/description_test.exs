@@ -95,14 +95,14 @@ defmodule Sim.Floorplan.DescriptionTest do
       end
 
       # What robots know is the same floor.
-      {:ok, %{grid: grid}} = Robot.Navigation.MapFile.open(file)
+      {:ok, %{grid: grid}} = Nav.MapFile.open(file)
 
       for i <- -20..20, j <- -20..20, place = {i * 0.2 + 0.05, j * 0.2 + 0.05} do
-        if Robot.Navigation.Grid.clearance(grid, place) > 0.1,
+        if Nav.Grid.clearance(grid, place) > 0.1,
           do: refute(Floorplan.wall?(map, place), inspect({turn, place}))
 
         if Floorplan.clearance(map, place, 0.3) > 0.2,
-          do: assert(Robot.Navigation.Grid.clearance(grid, place) > 0.0, inspect({turn, place}))
+          do: assert(Nav.Grid.clearance(grid, place) > 0.0, inspect({turn, place}))
       end
     end
   end

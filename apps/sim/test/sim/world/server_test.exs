@@ -3,7 +3,7 @@ defmodule Sim.World.ServerTest do
   use ExUnit.Case, async: false
   @moduletag :realtime
   @moduletag :capture_log
-  import Swarm.Case, only: [eventually: 1]
+  import Hal.Lines, only: [eventually: 1]
   alias Hal.{Device, Pose, Profile, Twist}
   alias Sim.World
 

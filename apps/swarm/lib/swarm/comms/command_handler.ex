@@ -21,14 +21,14 @@ defmodule Swarm.Comms.CommandHandler do
   While the emergency stop holds a robot, it refuses to be armed and all commands that would move
   it. The latter are also refused, with the reason, while its drive is offline or not armed
   (`Robot.Safety.Readiness`); otherwise the motion would begin later, when it is armed. A `goto` to a place that the
-  robot cannot reach by what it knows of walls is refused, too (`Robot.Navigation.Reach`).
+  robot cannot reach by what it knows of walls is refused, too (`Nav.Reach`).
   """
   alias Hal.{Device, Pose}
   alias Robot.{Board, Names}
   alias Robot.Control.Delivery
   alias Robot.Safety.{LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
-  alias Robot.Navigation.{Grid, Reach}
+  alias Nav.{Grid, Reach}
   alias Mesh.Nonblocking
   alias Swarm.{Behaviours, Missions, Replacement, Status}
   alias Swarm.Order

@@ -1,10 +1,10 @@
 defmodule Swarm.Formation.Space do
   @moduledoc """
   Decides where robots of a size can stand: beside bodies that stay where they are, and clear of the walls that the leader knows
-  (`Robot.Navigation.Grid`, `nil` for none). Pure; metres, in the frame of the map.
+  (`Nav.Grid`, `nil` for none). Pure; metres, in the frame of the map.
   """
   alias Hal.Pose
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   # The gap from edge to edge between a standing robot and a body, and between a standing robot and a wall.
   @gap 0.2

@@ -1,7 +1,7 @@
 defmodule Swarm.Formation.LadderTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Swarm.Formation.{Ladder, Space}
   doctest Swarm.Formation.Ladder
   doctest Swarm.Formation.Space

@@ -4,8 +4,8 @@ defmodule Soak.Fleet.Node do
   robot in the world of `Soak.WorldHost`, and the log of its doings (`Soak.Recorder`).
   """
   alias Soak.{Recorder, WorldHost}
-  alias Sim.Fleet.Hardware
-  alias Sim.Trial.Setup
+  alias Lab.Fleet.Hardware
+  alias Lab.Trial.Setup
   alias Sim.World
 
   @doc """
@@ -17,7 +17,7 @@ defmodule Soak.Fleet.Node do
     # Together, so that the missions are there when the mesh begins: it must know their atoms.
     config = [logger: [level: :none], swarm: [missions: about.missions, mesh: about.mesh]]
     Application.put_all_env(config)
-    {:ok, _apps} = Application.ensure_all_started(:sim, :permanent)
+    {:ok, _apps} = Application.ensure_all_started(:lab, :permanent)
 
     children =
       [World.Directory, {WorldHost.Link, {world(id), WorldHost.path(folder, id), id}}] ++

@@ -1,9 +1,9 @@
 defmodule Soak.Schedule.Draw do
   @moduledoc "Draws deeds of `bin/soak`, and what they are made of, from a state of `:rand`. Pure."
 
-  import Sim.Chaos.Random, only: [pick: 2, whole: 3]
+  import Lab.Chaos.Random, only: [pick: 2, whole: 3]
 
-  @type random :: Sim.Chaos.Random.t()
+  @type random :: Lab.Chaos.Random.t()
 
   @doc "A deed of a kind that lasts for itself, as in `Soak.Schedule`."
   @spec one(atom(), [atom(), ...], random()) :: {tuple() | atom(), random()}

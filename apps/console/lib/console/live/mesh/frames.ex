@@ -6,7 +6,7 @@ defmodule Console.Live.Mesh.Frames do
   # all others' in that of the start poses. Files that put two robots on one place cannot both be right: what is only known
   # by such a start is not known to others. Nor is the place of a robot that was started again on its way.
   alias Hal.Pose
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Swarm.Status
   alias Swarm.Status.Frame
 

@@ -7,7 +7,7 @@ defmodule Console.Live.Mesh.View do
   # are not drawn on one floor.
   alias Console.Live.Mesh.Frames
   alias Sim.Scene
-  alias Sim.Trial.Setup
+  alias Lab.Trial.Setup
   alias Swarm.Status
 
   # Older lines are forgotten.

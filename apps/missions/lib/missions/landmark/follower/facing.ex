@@ -6,7 +6,7 @@ defmodule Missions.Landmark.Follower.Facing do
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.SlotPoses
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   @unsure_ms 4_000
   # A line of sight is a disc of this radius (metres), less than the clearance of any free cell.

@@ -10,7 +10,7 @@ defmodule Missions.Landmark.Follower.Progress do
   alias Missions.Landmark.{Blocker, SlotPoses}
   alias Robot.Behaviour.Avoid.Neighbours
   alias Robot.Behaviour.Patience
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   @obstacle_ms 2_000
   @stuck_ms 8_000

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.Lookout.Legs do
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Coverage
-  alias Robot.Navigation.{Frontiers, Grid}
+  alias Nav.{Frontiers, Grid}
 
   # Frontiers within so many metres of one that it has been to, or did not get to, are not gone to again.
   @again 0.6

@@ -10,7 +10,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
   alias Robot.Behaviour.Avoid.{Echoes, Neighbours}
-  alias Robot.Navigation.Orca
+  alias Nav.Orca
 
   # Up to this speed (m/s) the gate's limits alone kept robots apart that all drove so across each other's ways without
   # looking (`Sim.GateAloneTest`; docs/reports/avoidance.md). A base may have few sonars behind.

@@ -1,9 +1,9 @@
 defmodule Robot.Behaviour.Avoid.Clearance do
   @moduledoc false
   # Expresses the distances that a robot keeps from robots and obstacles, as half-planes of velocities for
-  # `Robot.Navigation.Orca`. Pure.
+  # `Nav.Orca`. Pure.
   alias Hal.Pose
-  alias Robot.Navigation.Orca
+  alias Nav.Orca
   alias Robot.Percept
 
   # Desired distances (metres) to standing and to moving bodies; the least one applies when there

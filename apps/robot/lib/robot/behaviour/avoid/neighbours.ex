@@ -4,7 +4,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   the sonars see and that are not known robots or discs. Pure.
   """
   alias Hal.{Pose, Twist}
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Percept
   alias Robot.Safety.Reflex
 

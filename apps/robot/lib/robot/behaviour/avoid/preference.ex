@@ -1,6 +1,6 @@
 defmodule Robot.Behaviour.Avoid.Preference do
   @moduledoc false
-  # Computes the velocity that a robot prefers, before `Robot.Navigation.Orca` limits it by the other bodies: along its
+  # Computes the velocity that a robot prefers, before `Nav.Orca` limits it by the other bodies: along its
   # route, to the right of oncoming robots, and away from what is close. Pure; velocities in m/s, points in metres, in the
   # frame of the percept's pose.
   alias Hal.Pose

@@ -2,13 +2,13 @@ defmodule Robot.Behaviour.Avoid.RightOfWay do
   @moduledoc false
   # Decides which of two robots goes on that meet where only one fits, by what each knows of the other's place. Pure.
   #
-  # Each looks for its nearest passing place and the other's (`Robot.Navigation.PassingPlace`). The one that would have to go
+  # Each looks for its nearest passing place and the other's (`Nav.PassingPlace`). The one that would have to go
   # farther back goes on; of two that have about as far, the one whose name comes first. The other goes to its place, and
   # waits there until the way is free, or the other has not moved for some seconds. If they judged differently, because each
   # knows the other's place only nearly, they meet again, or stand before each other: then names decide.
   alias Hal.Pose
   alias Robot.Behaviour.Avoid.{Ahead, Neighbours}
-  alias Robot.Navigation.PassingPlace
+  alias Nav.PassingPlace
   alias Robot.Percept
 
   # So far ahead on its way (metres) a robot looks for others, and so far for the one that it has met.

@@ -5,7 +5,7 @@ defmodule Robot.Behaviour.Avoid.Route do
   # is clearly shorter. Otherwise a robot between two equally good routes would oscillate. Pure.
   alias Hal.Pose
   alias Robot.Percept
-  alias Robot.Navigation.{Grid, PathPlanner}
+  alias Nav.{Grid, PathPlanner}
   alias Robot.Behaviour.Avoid.Neighbours
 
   @enforce_keys [:corners, :goal, :at_ms]

@@ -4,9 +4,9 @@ defmodule Robot.Localiser.Walls.Facing do
   # Pure; metres and radians, in the frame of the map.
   #
   # A ray along the axis of the sonar finds the wall. Its distance, and the direction in which it faces, follow from the clearances
-  # before it (`Robot.Navigation.Grid`), which are finer than the cells. More rays look for what else is in the cone and nearer.
+  # before it (`Nav.Grid`), which are finer than the cells. More rays look for what else is in the cone and nearer.
   alias Hal.Pose
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
 
   # Directions beside the axis in which nothing may be nearer, as shares of half the cone.
   @rays [-0.5, 0.5, -1.0, 1.0]

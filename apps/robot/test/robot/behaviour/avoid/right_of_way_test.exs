@@ -2,7 +2,7 @@ defmodule Robot.Behaviour.Avoid.RightOfWayTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile, Twist}
   alias Robot.Behaviour.Avoid.{Ahead, Neighbours, RightOfWay}
-  alias Robot.Navigation.{Grid, PassingPlace}
+  alias Nav.{Grid, PassingPlace}
   alias Robot.Percept
   doctest Ahead
   doctest PassingPlace

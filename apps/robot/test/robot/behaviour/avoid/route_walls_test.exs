@@ -3,7 +3,7 @@ defmodule Robot.Behaviour.Avoid.RouteWallsTest do
   use ExUnit.Case, async: true
   alias Hal.{Pose, Profile}
   alias Robot.Behaviour.Avoid.Route
-  alias Robot.Navigation.{Grid, PathPlanner}
+  alias Nav.{Grid, PathPlanner}
   alias Robot.Percept
 
   # 8 x 6 m, a wall at x = 0 with a door from y = 1 to 2.2.

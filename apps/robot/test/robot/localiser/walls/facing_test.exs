@@ -2,7 +2,7 @@ defmodule Robot.Localiser.Walls.FacingTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Robot.Localiser.Walls.Facing
-  alias Robot.Navigation.Grid
+  alias Nav.Grid
   alias Robot.Room
 
   @cone :math.pi() / 6

@@ -1,0 +1,125 @@
+defmodule Lab.Recording.Drawing do
+  @moduledoc "Draws a run's scene for Foxglove and other viewers of its schemas. Pure."
+  alias Mcap.Foxglove
+  alias Mcap.Foxglove.Scene, as: Bodies
+  alias Robot.Recording.Drawing
+  alias Sim.{Floorplan, Scene}
+
+  @frame "map"
+  # A point of a way every 0.2 m, the last 1,000.
+  @apart_m 0.2
+  @points 1_000
+  # Of a floor plan, on its longer side.
+  @most_cells 256
+
+  @wall <<80, 80, 80, 255>>
+  @floor <<235, 235, 235, 255>>
+  @leader {0.90, 0.60, 0.10, 1}
+  @living {0.20, 0.45, 0.80, 1}
+  @dead {0.50, 0.50, 0.50, 1}
+  @landmark {0.95, 0.85, 0.10, 1}
+  @slot {0.20, 0.70, 0.30, 0.5}
+
+  @typedoc "Each robot's way."
+  @type paths :: %{atom() => Scene.way()}
+
+  @doc "The floor plan, walls dark; a large one in larger cells."
+  @spec map(Floorplan.t()) :: iodata()
+  def map(%Floorplan{} = map) do
+    {width, height} = Floorplan.size(map)
+    block = div(max(map.width, map.height) - 1, @most_cells) + 1
+    columns = div(map.width - 1, block) + 1
+    rows = div(map.height - 1, block) + 1
+
+    walls = walls(map, block)
+
+    pixels = for row <- 0..(rows - 1), into: <<>>, do: pixels(walls[row], columns)
+
+    fields =
+      for {name, offset} <- Enum.with_index(["red", "green", "blue", "alpha"]),
+          do: {name, offset, :u8}
+
+    Foxglove.grid(0, @frame, %{
+      pose: {{-width / 2, -height / 2}, 0},
+      columns: columns,
+      cell_size: {block * map.cell, block * map.cell},
+      row_stride: 4 * columns,
+      cell_stride: 4,
+      fields: fields,
+      data: pixels
+    })
+  end
+
+  defp pixels(nil, columns), do: :binary.copy(@floor, columns)
+
+  defp pixels(walls, columns) do
+    for column <- 0..(columns - 1),
+        into: <<>>,
+        do: if(is_map_key(walls, column), do: @wall, else: @floor)
+  end
+
+  # The larger cells that have a wall in them, by row and column: floor plans are mostly floor.
+  defp walls(map, block) do
+    for {place, 1} <- :binary.matches(map.field, <<0>>), reduce: %{} do
+      walls ->
+        row = place |> div(map.width) |> div(block)
+        column = place |> rem(map.width) |> div(block)
+        Map.update(walls, row, %{column => true}, &Map.put(&1, column, true))
+    end
+  end
+
+  @doc "Where each robot's body is."
+  @spec transforms(non_neg_integer(), Scene.t()) :: iodata()
+  def transforms(ns, scene) do
+    transforms = for robot <- scene.robots, do: {@frame, Atom.to_string(robot.id), robot.pose}
+    Foxglove.frame_transforms(ns, transforms)
+  end
+
+  @doc "Bodies, the landmark, and the places in the formation, all of them each time."
+  @spec scene(non_neg_integer(), Scene.t()) :: iodata()
+  def scene(ns, scene) do
+    entities =
+      for(robot <- scene.robots, do: robot(ns, robot)) ++
+        for(
+          %{slot: {x, y}} = robot <- scene.robots,
+          do: entity(ns, "place of #{robot.id}", [Drawing.spot({x, y}, @slot)])
+        ) ++
+        for {x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))
+
+    Foxglove.scene_update(entities, [Bodies.delete_all(ns)])
+  end
+
+  defp entity(ns, id, bodies), do: Bodies.entity(ns, @frame, id, bodies)
+
+  # In its own frame, with which it moves between two scenes.
+  defp robot(ns, %{id: id, radius: radius} = robot) do
+    bodies = Drawing.body({{0, 0}, 0}, radius, "#{id} #{robot.state}", colour(robot))
+
+    Bodies.entity(ns, Atom.to_string(id), Atom.to_string(id), bodies, frame_locked: true)
+  end
+
+  defp colour(%{alive: false}), do: @dead
+  defp colour(%{leader?: true}), do: @leader
+  defp colour(_robot), do: @living
+
+  defp pole({x, y}), do: [Bodies.cylinder({{x, y, 0.5}, 0}, {0.3, 0.3, 1.0}, @landmark)]
+
+  @doc "The ways with where the robots are now."
+  @spec note(paths(), Scene.t()) :: paths()
+  def note(paths, scene) do
+    for {id, way} <- Scene.ways(paths, scene, @apart_m),
+        into: %{},
+        do: {id, Enum.take(way, @points)}
+  end
+
+  @doc "The robots' ways as lines."
+  @spec paths(non_neg_integer(), paths()) :: iodata()
+  def paths(ns, paths) do
+    entities =
+      for {id, [_, _ | _] = path} <- Enum.sort(paths) do
+        entity(ns, "way of #{id}", [Bodies.line(Enum.reverse(path), 0.03, @living)])
+      end
+
+    Foxglove.scene_update(entities)
+  end
+end

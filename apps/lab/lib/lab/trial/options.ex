@@ -1,0 +1,156 @@
+defmodule Lab.Trial.Options do
+  @moduledoc "Checks the options of a run, with their defaults. Pure."
+  alias Hal.Options
+  alias Hal.Options.{Suggest, Type, Wording}
+  alias Missions.Landmark
+  alias Lab.Trial.{Cuts, Event}
+  alias Swarm.Missions
+
+  @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
+          "{x, y} in metres"}
+  # The options of the mission, without those that the robots know themselves.
+  @mission [formation: {:column, 1.0}, assign: :cost, leader_change: true, policy: :available] ++
+             [of: nil, lost_link: nil]
+
+  @doc """
+  All options, with defaults for those that are not given; the error is one line that names what
+  is wrong.
+
+      iex> {:ok, options} = Lab.Trial.Options.check(robots: [:mag1], formation: :wedge)
+      iex> {options.robots, options.formation, options.map}
+      {[:mag1], {:wedge, 1.0}, "hall"}
+      iex> {:error, line} = Lab.Trial.Options.check(nois: :off)
+      iex> line =~ ~r/^trial option nois is not known: allowed are robots, seed, .*; did you mean noise\\?$/
+      true
+      iex> Lab.Trial.Options.check(robots: 12)
+      {:error, "trial option robots: expected a list of different names that begin with mag or min, " <>
+        "[:mag1, :min1], got 12"}
+  """
+  @spec check(keyword() | map()) :: {:ok, map()} | {:error, line :: String.t()}
+  def check(asked) when is_map(asked), do: asked |> Map.to_list() |> check()
+
+  def check(asked) do
+    with {:ok, options} <- Options.check(asked, table(), "trial"),
+         options = Map.merge(Map.new(@mission), Map.new(options)),
+         {:ok, options} <- named(options),
+         [] <- problems(options),
+         :ok <- hardware(options) do
+      {:ok, options}
+    else
+      [_ | _] = problems -> {:error, Options.line(problems, "trial")}
+      error -> error
+    end
+  end
+
+  @doc "The table of all options: what is allowed."
+  @spec table() :: Options.table()
+  def table, do: own() ++ mission() ++ [mission: [Missions.type(), default: nil]]
+
+  defp own do
+    [
+      robots: [
+        {:check, &robots?/1,
+         "a list of different names that begin with mag or min, [:mag1, :min1],"},
+        default: [:mag1, :mag2, :mag3, :min1, :min2, :min3]
+      ],
+      seed: [:integer, default: 1],
+      map: [
+        {:path,
+         ~s(the name of a map, "FILE.yaml", "FILE.png:WIDTHxHEIGHT" or "FILE.pgm:WIDTHxHEIGHT")},
+        default: "hall"
+      ],
+      start: [{:one_of, [:spread, :same]}, default: :spread],
+      landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
+      moves: [{:check, &moves?/1, "[{{x, y}, at_s}]"}, default: []],
+      kills: [{:check, &kills?/1, "[{robot, at_s}]"}, default: []],
+      script: [Event.script_type(), default: []],
+      loss: [{:number, 0, 1}, default: 0.0],
+      duplicates: [{:number, 0, 1}, default: 0.0],
+      delay_ms: [{:span, 0, 3_600_000, "whole ms"}, default: {5, 50}],
+      cuts: [{:check, &Type.list?/1, "[{from_s, to_s, [[:mag1], [:mag2]]}]"}, default: []],
+      noise: [{:one_of, [:off, :default, :slip]}, default: :default],
+      duration_s: [{:check, &duration?/1, "seconds, 0 to 1000000,"}, default: 120],
+      plan: [{:one_of, [:none, :known, :sonar]}, default: :none],
+      casts: [{:one_of, [:sent, :drawn]}, default: :sent],
+      blobs: [{:one_of, [:painted, :direct]}, default: :painted],
+      hardware: [
+        {:check, &ids?/1, "a list of robots of this run, [:mag1],"},
+        default: []
+      ]
+    ]
+  end
+
+  defp mission, do: Keyword.take(Landmark.Options.table(), Keyword.keys(@mission))
+
+  # What its options say counts for all that looks at the run, too.
+  defp named(%{mission: nil} = options), do: {:ok, options}
+
+  defp named(%{mission: mission, robots: robots} = options) do
+    with {:ok, {module, own} = mission} <- Missions.choose(mission, length(robots)) do
+      shared = if module == Landmark, do: Map.new(Keyword.take(own, Keyword.keys(@mission)))
+      {:ok, Map.merge(%{options | mission: mission}, shared || %{})}
+    end
+  end
+
+  @doc "What is wrong with values of the table that each by itself does not show: names of robots that the run does not have, in its script, too."
+  @spec problems(map()) :: [Type.problem()]
+  def problems(%{robots: robots} = options) do
+    cuts =
+      "expected [{from_s, to_s, [[:mag1], [:mag2]]}] or " <>
+        "[{from_s, :end, {:link, :mag1, :mag2}}], with robots of this run, got "
+
+    kills =
+      for {{who, _at_s} = kill, n} <- Enum.with_index(options.kills, 1),
+          who not in [:leader | robots],
+          do:
+            {["kills", "#{n}"],
+             "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
+               Suggest.hint(inspect(who), robots)}
+
+    cut? = Cuts.valid?(options.cuts, robots)
+
+    if(cut?, do: [], else: [{["cuts"], cuts <> Wording.show(options.cuts)}]) ++
+      kills ++ Event.problems(options.script, robots)
+  end
+
+  @doc "Whether robots have the floor plan, if that is not said: those that make a map themselves do not."
+  @spec plan(term()) :: :none | :known
+  def plan(nil), do: :known
+
+  def plan(mission) do
+    case Missions.choose(mission, nil) do
+      {:ok, {module, _own}} -> if function_exported?(module, :map, 1), do: :none, else: :known
+      {:error, _line} -> :known
+    end
+  end
+
+  defp hardware(%{hardware: ids, robots: robots}) do
+    if ids == Enum.uniq(ids) and ids -- robots == [],
+      do: :ok,
+      else: refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
+  end
+
+  defp refuse(key, value, allowed), do: Options.refuse("trial", [key], value, allowed)
+
+  defp robots?([_ | _] = robots),
+    do: Type.list?(robots) and Enum.all?(robots, &robot?/1) and robots == Enum.uniq(robots)
+
+  defp robots?(_other), do: false
+
+  defp duration?(seconds), do: is_number(seconds) and seconds >= 0 and seconds <= 1_000_000
+
+  defp moves?(moves), do: Type.list?(moves) and Enum.all?(moves, &move?/1)
+
+  defp move?({{x, y}, at_s}), do: is_number(x) and is_number(y) and is_number(at_s)
+  defp move?(_other), do: false
+
+  defp kills?(kills), do: Type.list?(kills) and Enum.all?(kills, &kill?/1)
+
+  defp kill?({robot, at_s}), do: is_atom(robot) and is_number(at_s)
+  defp kill?(_other), do: false
+
+  defp ids?(ids), do: Type.list?(ids) and Enum.all?(ids, &is_atom/1)
+
+  defp robot?(id) when is_atom(id), do: String.starts_with?(Atom.to_string(id), ["mag", "min"])
+  defp robot?(_other), do: false
+end

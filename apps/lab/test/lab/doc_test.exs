@@ -1,0 +1,9 @@
+defmodule Lab.DocTest do
+  use ExUnit.Case, async: true
+  doctest Lab
+  doctest Lab.Fleet.Mission
+  doctest Lab.Fleet.Said
+  doctest Lab.Trial.Cuts
+  doctest Lab.Trial.Memory
+  doctest Lab.Trial.Options
+end

@@ -1,0 +1,4 @@
+defmodule NavTest do
+  use ExUnit.Case, async: true
+  doctest Nav
+end

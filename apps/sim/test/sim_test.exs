@@ -1,4 +1,0 @@
-defmodule SimTest do
-  use ExUnit.Case, async: true
-  doctest Sim
-end
