@@ -7,7 +7,7 @@ defmodule Bench do
   a case counts from that moment, else from the start.
   """
 
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @type deed :: nil | :move | :kill_leader | :kill_middle
   @type case :: %{

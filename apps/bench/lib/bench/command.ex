@@ -1,7 +1,8 @@
 defmodule Bench.Command do
   @moduledoc "Runs a command `mix bench NAME`: reads its options by its table, or prints its help."
   alias Bench.Load
-  alias Console.Cli.{Arguments, MapName, Output, Progress}
+  alias Console.Cli.{MapName, Output, Progress}
+  alias Hal.Cli.Arguments
 
   @doc "Measures with the options given, by their names; each error is one line. `more` ends the help."
   @spec run([String.t()], String.t(), [Arguments.option()], (map() -> result), more :: String.t()) ::

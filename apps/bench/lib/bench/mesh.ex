@@ -3,7 +3,7 @@ defmodule Bench.Mesh do
   Lists what `mix bench swarm` measures, and what it should beat: the cases with their goals, and JADE's
   figures, which were measured separately. Pure. Times are microseconds, memory is bytes.
   """
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @type size :: pos_integer() | :one
   @typedoc "`:one` is many robots in one node."

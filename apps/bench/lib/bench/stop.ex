@@ -6,7 +6,7 @@ defmodule Bench.Stop do
   The stop has arrived when both axes of the base were told a speed of zero. What the base does
   then (it brakes) is not measured.
   """
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @type name :: :crash | :frozen | :kill | :freeze | :pull | :estop | :bumper
   @type case :: %{name: name(), says: String.t(), goal_ms: pos_integer() | nil}

@@ -1,7 +1,10 @@
 defmodule Console.Fleet do
   @moduledoc """
-  Names the robots of a fleet: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
+  Reads a fleet and its formation, and names its robots: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
   """
+
+  alias Hal.Cli.Parse
+  alias Swarm.Formation
 
   @most 1_000
 
@@ -30,8 +33,7 @@ defmodule Console.Fleet do
     parts = text |> String.split(",") |> Enum.map(&String.split(&1, ":"))
     kinds = for [kind, _count] <- parts, do: kind
 
-    counts =
-      for [_kind, count] <- parts, {:ok, n} <- [Console.Cli.Parse.whole(count, 0..@most)], do: n
+    counts = for [_kind, count] <- parts, {:ok, n} <- [Parse.whole(count, 0..@most)], do: n
 
     if length(counts) == length(parts) and kinds -- ["mag", "min"] == [] and
          Enum.sum(counts) in 1..@most do
@@ -62,4 +64,39 @@ defmodule Console.Fleet do
 
   # At most a thousand names of each kind exist, so these atoms are bounded.
   defp names(kind, count), do: for(k <- 1..count//1, do: :"#{kind}#{k}")
+
+  @doc "The formations by name."
+  @spec formations() :: [String.t()]
+  def formations, do: Enum.map(Formation.kinds(), &Atom.to_string/1)
+
+  @doc """
+  A formation and its spacing in metres, `KIND[:SPACING]`.
+
+      iex> Console.Fleet.formation("wedge:1.2")
+      {:ok, {:wedge, 1.2}}
+      iex> Console.Fleet.formation("column")
+      {:ok, {:column, 1.0}}
+  """
+  @spec formation(String.t()) ::
+          {:ok, {atom(), float()}} | {:error, Hal.Cli.Arguments.allowed()}
+  def formation(text) do
+    {kind, spacing} =
+      case String.split(text, ":", parts: 2) do
+        [kind] -> {kind, "1.0"}
+        [kind, spacing] -> {kind, spacing}
+      end
+
+    known = Enum.find(Formation.kinds(), &(Atom.to_string(&1) == kind))
+
+    with {:kind, true} <- {:kind, known != nil},
+         {:ok, spacing} <- Parse.number(spacing, 0.8, 5.0) do
+      {:ok, {known, spacing}}
+    else
+      {:kind, false} ->
+        {:error, {Parse.either(formations()), Hal.Options.Suggest.hint(kind, formations())}}
+
+      {:error, _} ->
+        {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
+    end
+  end
 end

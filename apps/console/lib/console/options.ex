@@ -3,9 +3,10 @@ defmodule Console.Options do
   Reads the options of `mix demo`, checked once when it starts. Pure. One table describes the options and makes the help
   text.
   """
-  alias Console.{Cli, Fleet}
+  alias Console.Fleet
   alias Console.Options.Page
-  alias Console.Cli.{MapName, Parse}
+  alias Console.Cli.MapName
+  alias Hal.Cli.Parse
   alias Console.Live.Pace
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
@@ -64,7 +65,7 @@ defmodule Console.Options do
   """
   @spec parse([String.t()], Path.t()) :: {:ok, t()} | {:error, [String.t()]}
   def parse(arguments, folder \\ ".") do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table(folder)),
+    with {:ok, pairs} <- Hal.Cli.Arguments.parse(arguments, table(folder)),
          {:ok, options} <- fleet(pairs) do
       pairs
       |> Enum.reduce(options, &put/2)
@@ -86,7 +87,7 @@ defmodule Console.Options do
 
       bin/demo [options]        (or: mix demo [options])
 
-    #{Cli.Arguments.help(table("."))}
+    #{Hal.Cli.Arguments.help(table("."))}
 
     Examples
       bin/demo                                              six robots, live in the terminal
@@ -165,7 +166,7 @@ defmodule Console.Options do
        "of wheels and pictures: off, default, slip (default)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
        "#{Parse.either(Missions.names())}, with options of it\n(#{hd(Missions.names() ++ ["none"])})"},
-      {"formation", "KIND[:SPACING]", &Parse.formation/1,
+      {"formation", "KIND[:SPACING]", &Fleet.formation/1,
        "column, line, wedge, triangle, diamond or circle;\nspacing 0.8 to 5 m (column:1)"},
       {"assign", "HOW", &Parse.choice(&1, chain: :chain, cost: :cost),
        "who takes which place: chain by distance, or least cost (cost)"},

@@ -5,8 +5,7 @@ defmodule Console.Prompt do
   Names become robots by comparison; a text never becomes an atom.
   """
   alias Console.Fleet
-  alias Console.Cli
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
   alias Console.Live.Pace
   alias Console.Prompt.Stop
   alias Hal.Options.Suggest
@@ -139,7 +138,7 @@ defmodule Console.Prompt do
     case before do
       [] -> @words ++ ["all" | names]
       ["kill"] -> ["leader" | names]
-      ["formation"] -> Parse.formations()
+      ["formation"] -> Console.Fleet.formations()
       ["landmark"] -> ["none"]
       ["follow", _follower] -> names
       ["tell"] -> ["all" | names]
@@ -210,12 +209,12 @@ defmodule Console.Prompt do
     do: {:error, "kill needs one name: kill leader, kill mag1"}
 
   defp command("formation", [kind], _robots) do
-    case Parse.formation(kind) do
+    case Console.Fleet.formation(kind) do
       {:ok, {kind_atom, spacing}} ->
         {:ok, {:formation, {kind_atom, if(kind =~ ":", do: spacing)}}}
 
       {:error, allowed} ->
-        Cli.Arguments.refuse("formation", kind, allowed)
+        Hal.Cli.Arguments.refuse("formation", kind, allowed)
     end
   end
 
@@ -223,7 +222,7 @@ defmodule Console.Prompt do
     do: command("formation", [kind <> ":" <> spacing], robots)
 
   defp command("formation", _rest, _robots),
-    do: {:error, "formation needs a kind: #{Parse.either(Parse.formations())}"}
+    do: {:error, "formation needs a kind: #{Parse.either(Console.Fleet.formations())}"}
 
   defp command(word, ["none"], _robots) when word in ["landmark", "move"],
     do: {:ok, {:landmark, :none}}
@@ -325,7 +324,7 @@ defmodule Console.Prompt do
   defp paced(word, kind, text, parse) do
     case parse.(text) do
       {:ok, value} -> {:ok, {:pace, {kind, value}}}
-      {:error, allowed} -> Cli.Arguments.refuse(word, text, allowed)
+      {:error, allowed} -> Hal.Cli.Arguments.refuse(word, text, allowed)
     end
   end
 

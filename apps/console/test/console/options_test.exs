@@ -2,9 +2,7 @@ defmodule Console.OptionsTest do
   use ExUnit.Case, async: true
   alias Console.Options
 
-  doctest Console.Cli.Arguments
   doctest Console.Cli.MapName
-  doctest Console.Cli.Parse
   doctest Console.Fleet
   doctest Console.Options
 

@@ -63,7 +63,7 @@ defmodule Lab.FleetTest do
     stage = eventually(fn -> Enum.find(Fleet.scene(fleet).stages, &(&1.stage == :crashed)) end)
 
     assert %{robot: :mag79, crash: "(RuntimeError) boom, " <> place} = stage
-    assert place =~ ~r"^(apps/sim/)?test/sim/fleet_test.exs:\d+$"
+    assert place =~ ~r"^(apps/lab/)?test/lab/fleet_test.exs:\d+$"
     eventually(fn -> inspect(Swarm.status(:mag79)) =~ "idle" end)
     assert inspect(Swarm.status(:mag79)) =~ "CRASHED (RuntimeError) boom, " <> place
     assert Enum.any?(Fleet.result(fleet).stages, &(&1.stage == :crashed))

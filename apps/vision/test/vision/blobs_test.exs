@@ -100,27 +100,35 @@ defmodule Vision.BlobsTest do
           {~w(a b --colours c), "expected one source, got 2: a, b"},
           {~w(a), "--colours FILE is missing"},
           {~w(a --colours), "--colours needs a value"},
-          {~w(a --colours c --every x), "--every: expected a whole number, got \"x\""},
+          {~w(a --colours c --every x),
+           "--every: expected a whole number from 1 to 1000000000, got \"x\""},
           {~w(a --colours c --every 0),
-           "--every: expected whole numbers from 1 to 1000000000, got 0"},
+           "--every: expected a whole number from 1 to 1000000000, got \"0\""},
           {~w(a --colours c --frames -3),
-           "--frames: expected whole numbers from 1 to 1000000000, got -3"},
+           "--frames: expected a whole number from 1 to 1000000000, got \"-3\""},
           {~w(a --colours c --pictures p.png),
            "unknown option --pictures; did you mean --picture?"},
           {~w(a --colours c --zzz), "unknown option --zzz; known are --colours"},
           {~w(a --colours c --picture p.gif),
            "--picture: expected names ending in .png or .jpg, got \"p.gif\""},
-          {~w(a --colours c --picture /no/p.png), "--picture /no/p.png: no folder /no"},
-          {~w(a --colours c --json lib), "--json: expected a file, got \"lib\", a folder"},
+          {~w(a --colours c --picture /no/p.png),
+           "--picture: expected a file in a folder that exists, got \"/no/p.png\""},
+          {~w(a --colours c --json lib), "--json: expected a file, not a folder, got \"lib\""},
           {~w(a --colours c --backend Vision.Backend.Nativ),
            "--backend: expected a module of this build"},
           {~w(a --colours c --distance Red), "--distance: expected NAME=K"},
           {~w(a --colours c --distance Red=-1),
            "--distance: expected NAME=K with K above 0, as in Yellow=0.0651, got \"Red=-1\""}
         ] do
-      assert {:error, line} = Options.parse(words)
+      assert {:error, [line]} = parsed(words)
       assert String.starts_with?(line, said), line
       refute line =~ "\n"
     end
+  end
+
+  defp parsed(words) do
+    with {:ok, given, sources} <- Hal.Cli.Arguments.parse_words(words, Options.table()),
+         {:error, line} <- Options.check(given, sources),
+         do: {:error, [line]}
   end
 end

@@ -1,7 +1,8 @@
 defmodule Bench.Explore.Main do
   @moduledoc "Runs the command `mix bench explore`: reads its options, measures, prints the table."
   alias Bench.{Command, Explore, Table}
-  alias Console.Cli.{Format, Parse}
+  alias Console.Cli.Format
+  alias Hal.Cli.Parse
 
   @maps ~w(hall openplan offices)
   @fleets [1, 4]

@@ -1,7 +1,8 @@
 defmodule Bench.Goto.Main do
   @moduledoc "Runs the command `mix bench goto`: reads its options, measures, prints the table."
   alias Bench.{Command, Goto, Table}
-  alias Console.Cli.{Format, Parse}
+  alias Console.Cli.Format
+  alias Hal.Cli.Parse
 
   @maps ~w(offices hospital clinic lab cave ring doorway openplan)
 

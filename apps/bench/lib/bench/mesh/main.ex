@@ -1,6 +1,7 @@
 defmodule Bench.Mesh.Main do
   @moduledoc "Runs the command `mix bench swarm`: reads its options, measures, prints the table."
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Output
+  alias Hal.Cli.Parse
   alias Bench.{Command, Load, Mesh}
 
   @doc "Runs the command; each error is one line."

@@ -1,7 +1,7 @@
 defmodule Bench.Page.Main do
   @moduledoc "Runs the command `mix bench page`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Page}
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5}
 

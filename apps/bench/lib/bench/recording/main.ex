@@ -1,7 +1,7 @@
 defmodule Bench.Recording.Main do
   @moduledoc "Runs the command `mix bench recording`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Recording, Table}
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}

@@ -1,7 +1,7 @@
 defmodule Bench.Scale.Main do
   @moduledoc "Runs the command `mix bench scale`: reads its options, measures, prints table and bars."
   alias Bench.{Command, Load, Scale}
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}

@@ -1,6 +1,7 @@
 defmodule Bench.Stop.Main do
   @moduledoc "Runs the command `mix bench stop`: reads its options, measures, prints the table."
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Output
+  alias Hal.Cli.Parse
   alias Bench.{Command, Load, Stop}
 
   @doc "Runs the command; each error is one line."

@@ -1,7 +1,8 @@
 defmodule Bench.Vision.Main do
   @moduledoc "Runs the command `mix bench vision`: reads its options, measures, prints the table."
   alias Bench.{Command, Load, Vision}
-  alias Console.Cli.{Output, Parse}
+  alias Console.Cli.Output
+  alias Hal.Cli.Parse
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}

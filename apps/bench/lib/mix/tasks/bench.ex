@@ -27,9 +27,8 @@ defmodule Mix.Tasks.Bench do
   measured, 1 if the input was wrong or a run could not be made.
   """
   use Mix.Task
-  alias Console.Cli
-  alias Console.Cli.{MapName, Parse}
-  alias Hal.CommandBuild
+  alias Console.Cli.MapName
+  alias Hal.Cli.Parse
 
   @commands %{
     "goto" => Bench.Goto.Main,
@@ -43,12 +42,12 @@ defmodule Mix.Tasks.Bench do
   }
 
   @impl Mix.Task
-  def run(arguments), do: Hal.CommandOutput.run("bench", fn -> bench(arguments) end)
+  def run(arguments), do: Hal.Cli.Command.guard("bench", fn -> bench(arguments) end)
 
   defp bench(["demo" | arguments]) do
-    CommandBuild.update()
+    Hal.Cli.Command.update()
 
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()),
+    with {:ok, pairs} <- Hal.Cli.Arguments.parse(arguments, table()),
          {:ok, given} <- of_mission(Map.new(pairs)) do
       measure(given)
     else
@@ -57,7 +56,7 @@ defmodule Mix.Tasks.Bench do
   end
 
   defp bench([name | arguments]) when is_map_key(@commands, name) do
-    CommandBuild.update()
+    Hal.Cli.Command.update()
     with {:error, lines} <- @commands[name].run(arguments), do: refuse(lines)
   end
 
@@ -154,8 +153,8 @@ defmodule Mix.Tasks.Bench do
 
   defp help do
     cases = Enum.map_join(Bench.cases(), "\n", &"  #{String.pad_trailing(&1.name, 18)}#{&1.says}")
-    IO.puts("  mix bench demo [options]\n\n#{Cli.Arguments.help(table())}\n\nCases\n#{cases}")
+    IO.puts("  mix bench demo [options]\n\n#{Hal.Cli.Arguments.help(table())}\n\nCases\n#{cases}")
   end
 
-  defp refuse(lines), do: Cli.Command.refuse("bench", lines)
+  defp refuse(lines), do: Hal.Cli.Command.refuse("bench", lines)
 end

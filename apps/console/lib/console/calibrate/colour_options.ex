@@ -2,8 +2,7 @@ defmodule Console.Calibrate.ColourOptions do
   @moduledoc false
   # Reads the command line of `mix calibrate colour`: turns its arguments into a checked map or error
   # lines. Pure.
-  alias Console.Cli
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @type t :: %{
           source: String.t(),
@@ -18,8 +17,8 @@ defmodule Console.Calibrate.ColourOptions do
           metres: float() | nil
         }
 
-  @doc "The table of the options, as `Console.Cli.Arguments` takes it."
-  @spec table() :: [Cli.Arguments.option()]
+  @doc "The table of the options, as `Hal.Cli.Arguments` takes it."
+  @spec table() :: [Hal.Cli.Arguments.option()]
   def table do
     [
       {"box", "X,Y,W,H", &numbers(&1, 4, "X,Y,WIDTH,HEIGHT in pixels from the top left"),
@@ -57,7 +56,7 @@ defmodule Console.Calibrate.ColourOptions do
   def parse(words) do
     {sources, words} = Enum.split_while(words, &(not String.starts_with?(&1, "--")))
 
-    with {:ok, given} <- Cli.Arguments.parse(words, table()) do
+    with {:ok, given} <- Hal.Cli.Arguments.parse(words, table()) do
       map = Map.new(given)
       if map["help"], do: :help, else: check(sources, given, map)
     end

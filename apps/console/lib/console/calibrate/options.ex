@@ -2,8 +2,7 @@ defmodule Console.Calibrate.Options do
   @moduledoc false
   # Reads the command line of `mix calibrate odometry`: turns its arguments into a checked map or error
   # lines. Pure.
-  alias Console.Cli
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @type t :: %{
           file: Path.t() | nil,
@@ -25,8 +24,8 @@ defmodule Console.Calibrate.Options do
           wheels: keyword(float())
         }
 
-  @doc "The table of the options, as `Console.Cli.Arguments` takes it."
-  @spec table() :: [Cli.Arguments.option()]
+  @doc "The table of the options, as `Hal.Cli.Arguments` takes it."
+  @spec table() :: [Hal.Cli.Arguments.option()]
   def table do
     [
       {"distance", "METRES", &zero_or(&1, 0.5, 50),
@@ -77,7 +76,7 @@ defmodule Console.Calibrate.Options do
   def parse(words) do
     {files, words} = files(words)
 
-    with {:ok, given} <- Cli.Arguments.parse(words, table()) do
+    with {:ok, given} <- Hal.Cli.Arguments.parse(words, table()) do
       map = Map.new(given)
 
       if map["help"],

@@ -1,13 +1,13 @@
 defmodule Console.Calibrate.Question do
   @moduledoc "Asks the questions after a course, and reads the answers. Pure."
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
   alias Console.Cli.Format
   alias Hal.Pose
 
   @degree :math.pi() / 180
 
   @doc "The question of a course, and the check of its answer (`Console.Calibrate.StdinPrompt.ask/3`)."
-  @spec of(Lab.Calibration.task()) :: {String.t(), Console.Cli.Arguments.check()}
+  @spec of(Lab.Calibration.task()) :: {String.t(), Hal.Cli.Arguments.check()}
   def of({:distance, way}),
     do:
       {"How far is it from its mark, in a straight line, in metres? ",

@@ -76,7 +76,7 @@ defmodule Console.Calibrate.StdinPrompt do
 
   defp allowed(text, words) do
     names = Enum.map(words, &if(&1 == "", do: "Enter alone", else: &1))
-    "#{Console.Cli.Parse.either(names)}#{Hal.Options.Suggest.hint(text, words)}"
+    "#{Hal.Cli.Parse.either(names)}#{Hal.Options.Suggest.hint(text, words)}"
   end
 
   @doc "Drops what was typed meanwhile, because it is not an answer to the next question."

@@ -1,6 +1,6 @@
 defmodule Console.Chaos.Options do
   @moduledoc "Reads the options of `mix chaos`. Pure. One table describes them and makes the help text."
-  alias Console.Cli.{Arguments, Parse}
+  alias Hal.Cli.{Arguments, Parse}
   alias Swarm.Missions
 
   @most_runs 1_000_000

@@ -1,6 +1,6 @@
 defmodule Console.Cli.MapName do
   @moduledoc "Reads a map on a command line: a built-in one by name, a description, or a picture with its size. Pure."
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
   alias Sim.Floorplan.Maps
 
   @doc """

@@ -48,7 +48,7 @@ defmodule Console.Live.Pace do
   def speed("max"), do: {:ok, :max}
 
   def speed(text) do
-    with {:error, _allowed} <- Console.Cli.Parse.number(text, @least, @most),
+    with {:error, _allowed} <- Hal.Cli.Parse.number(text, @least, @most),
          do: {:error, "a number from 0.1 to 100, or max,"}
   end
 
@@ -59,7 +59,7 @@ defmodule Console.Live.Pace do
       {:ok, 10}
   """
   @spec steps(String.t()) :: {:ok, pos_integer()} | {:error, String.t()}
-  def steps(text), do: Console.Cli.Parse.whole(text, 1..@most_steps)
+  def steps(text), do: Hal.Cli.Parse.whole(text, 1..@most_steps)
 
   @doc """
   Carries out a command. Steps are for a paused run.

@@ -1,12 +1,12 @@
 defmodule Console.Options.Page do
   @moduledoc "Decides where a page is served: the options of the commands that have one. Reads the file of its token, nothing else."
   alias Console.Page
-  alias Console.Cli.Parse
+  alias Hal.Cli.Parse
 
   @token_file "a file of mode 0600 with 8 to 100 letters, digits, - and _"
 
-  @doc "The rows for `Console.Cli.Arguments`; names of files are relative to `folder`."
-  @spec table(Path.t()) :: [Console.Cli.Arguments.option()]
+  @doc "The rows for `Hal.Cli.Arguments`; names of files are relative to `folder`."
+  @spec table(Path.t()) :: [Hal.Cli.Arguments.option()]
   def table(folder) do
     [
       {"page-address", "A", &address/1,

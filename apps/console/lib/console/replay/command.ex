@@ -1,6 +1,6 @@
 defmodule Console.Replay.Command do
   @moduledoc "Reads what a person types in `mix replay FILE --step`. Pure."
-  alias Console.Cli.{Arguments, Parse}
+  alias Hal.Cli.{Arguments, Parse}
   alias Console.Replay.Asked
   alias Hal.Options.Suggest
 

@@ -1,6 +1,6 @@
 defmodule Console.Replay.Options do
   @moduledoc "Reads the options of `mix replay`, checked once when it starts. Pure."
-  alias Console.Cli.{Arguments, Parse}
+  alias Hal.Cli.{Arguments, Parse}
 
   defstruct file: nil,
             at_s: nil,

@@ -2,7 +2,7 @@ defmodule Console.Scenario.Options do
   @moduledoc false
   # Reads the arguments of `mix scenario`: files, how much is printed, and where failed runs are recorded (`nil`:
   # nowhere). Pure.
-  alias Console.Cli.{Arguments, Parse}
+  alias Hal.Cli.{Arguments, Parse}
 
   @enforce_keys [:files]
   defstruct @enforce_keys ++ [quiet: false, record: nil, live: false]

@@ -17,10 +17,10 @@ defmodule Mix.Tasks.Calibrate do
 
   @impl Mix.Task
   def run(arguments),
-    do: Hal.CommandOutput.run("calibrate", fn -> calibrate(arguments) end)
+    do: Hal.Cli.Command.guard("calibrate", fn -> calibrate(arguments) end)
 
   defp calibrate(arguments) do
-    Hal.CommandBuild.update()
+    Hal.Cli.Command.update()
 
     case arguments do
       ["odometry" | rest] ->
@@ -54,7 +54,7 @@ defmodule Mix.Tasks.Calibrate do
   @spec refuse(String.t() | [String.t()]) :: no_return()
   @spec refuse(String.t() | [String.t()], String.t() | nil) :: no_return()
   defp refuse(lines, more \\ nil) do
-    Console.Cli.Command.refuse("calibrate", List.wrap(lines) ++ List.wrap(more))
+    Hal.Cli.Command.refuse("calibrate", List.wrap(lines) ++ List.wrap(more))
   end
 
   defp odometry_help do
@@ -68,7 +68,7 @@ defmodule Mix.Tasks.Calibrate do
     1996); before each a person says go, after each he types what he measured. Enter stops it at once.
     What was found is shown as the change of the robot file, and written when he says so.
 
-    #{Console.Cli.Arguments.help(Console.Calibrate.Options.table())}
+    #{Hal.Cli.Arguments.help(Console.Calibrate.Options.table())}
 
     Examples:
 
@@ -99,7 +99,7 @@ defmodule Mix.Tasks.Calibrate do
     Outliers in a box are left out (edges, glare, background in its corners); what is left is widened
     by what a change of light does, as far as nothing else in the picture is taken for the colour.
 
-    #{Console.Cli.Arguments.help(Console.Calibrate.ColourOptions.table())}
+    #{Hal.Cli.Arguments.help(Console.Calibrate.ColourOptions.table())}
 
     Examples:
 

@@ -11,7 +11,7 @@ defmodule Mix.Tasks.Chaos do
 
   @impl Mix.Task
   def run(arguments) do
-    Console.Cli.Command.run("chaos", fn ->
+    Hal.Cli.Command.run("chaos", fn ->
       # A run that raises is a finding, and told in its line.
       Logger.configure(level: :none)
 

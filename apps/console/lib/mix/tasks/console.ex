@@ -7,17 +7,17 @@ defmodule Mix.Tasks.Console do
   Exit status: 1 if the input was wrong, or there can be no page.
   """
   use Mix.Task
-  alias Console.{Cli, Live, Page}
+  alias Console.{Live, Page}
 
   @look_ms 500
 
   @impl Mix.Task
   def run(arguments) do
-    with {:ok, pairs} <- Cli.Arguments.parse(arguments, table()) do
+    with {:ok, pairs} <- Hal.Cli.Arguments.parse(arguments, table()) do
       options = Map.merge(%{"page-address" => {127, 0, 0, 1}}, Map.new(pairs))
 
       if options["help"],
-        do: Hal.CommandOutput.run("console", fn -> IO.write(help()) end),
+        do: Hal.Cli.Command.guard("console", fn -> IO.write(help()) end),
         else: options |> serve() |> refused()
     else
       {:error, lines} -> refused({:error, lines ++ ["--help lists all options"]})
@@ -38,7 +38,7 @@ defmodule Mix.Tasks.Console do
 
       bin/console [options]
 
-    #{Cli.Arguments.help(table())}
+    #{Hal.Cli.Arguments.help(table())}
 
     The fleet's secret is read from CONVOY_SECRET_FILE (convoy.secret); bin/node --help lists more.
     """
@@ -111,5 +111,5 @@ defmodule Mix.Tasks.Console do
     end
   end
 
-  defp refused({:error, lines}), do: Cli.Command.refuse("console", List.wrap(lines))
+  defp refused({:error, lines}), do: Hal.Cli.Command.refuse("console", List.wrap(lines))
 end

@@ -23,7 +23,7 @@ defmodule Mix.Tasks.Demo do
 
   @impl Mix.Task
   def run(arguments) do
-    Console.Cli.Command.run("demo", fn ->
+    Hal.Cli.Command.run("demo", fn ->
       # Robots are killed here on purpose, and reports of their supervisors would spoil the screen.
       Logger.configure(level: :none)
 

@@ -7,7 +7,7 @@ defmodule Mix.Tasks.Replay do
   not recorded; 1 something was wrong with the input.
   """
   use Mix.Task
-  alias Console.Cli.Command
+  alias Hal.Cli.Command
   alias Console.Replay
   alias Console.Replay.Options
 

@@ -11,7 +11,7 @@ defmodule Mix.Tasks.Scenario do
 
   @impl Mix.Task
   def run(arguments) do
-    Console.Cli.Command.run("scenario", fn ->
+    Hal.Cli.Command.run("scenario", fn ->
       case Options.parse(arguments, System.get_env("CONVOY_FROM", ".")) do
         :help -> IO.write(Options.help())
         {:ok, options} -> Session.run(options)

@@ -10,32 +10,33 @@ defmodule Mix.Tasks.Fleet.Certs do
 
   Existing files are kept: to add a robot later, run it again with its name. Needs `openssl`.
 
-  Options:
-
-    * `--fleet FILE` - the names of robots, one per line; `#` begins a comment
-    * `--out DIR` - the folder (`certs`, which git ignores); copy `DIR/mag1` to mag1, and keep
-      `DIR/ca-key.pem` to yourself
-    * `--force` - make new keys and certificates for these robots; never a new CA
-    * `--help` - this text
+  `--help` lists the options.
   """
   use Mix.Task
-  alias Hal.CommandOutput
+  alias Hal.Cli.Command
   alias Mesh.Distribution.Certs
 
-  @switches [fleet: :string, out: :string, force: :boolean, help: :boolean]
+  @options [
+    {"fleet", "FILE", &Hal.Cli.Parse.text/1,
+     "the names of robots, one per line; # begins a comment"},
+    {"out", "DIR", &Hal.Cli.Parse.text/1,
+     "the folder (certs, which git ignores); copy DIR/mag1 to mag1, and\nkeep DIR/ca-key.pem to yourself"},
+    {"force", nil, nil, "make new keys and certificates for these robots; never a new CA"}
+  ]
   @longest 65_536
 
   @impl Mix.Task
-  def run(words),
-    do: CommandOutput.run("fleet.certs", words, @moduledoc, [strict: @switches], &certs/2)
+  def run(words), do: Command.run("fleet.certs", words, {@moduledoc, @options}, &certs/2)
 
-  defp certs(options, names) do
-    with {:ok, more} <- listed(options[:fleet]),
+  defp certs(given, names) do
+    options = Map.new(given)
+
+    with {:ok, more} <- listed(options["fleet"]),
          {:ok, names} <- check(Enum.uniq(names ++ more)),
-         folder = options[:out] || "certs",
+         folder = options["out"] || "certs",
          {:ok, ca} <- Certs.ca(folder) do
       tell("#{folder}/ca.pem", ca)
-      Enum.find_value(names, :ok, &robot(folder, &1, options[:force] || false))
+      Enum.find_value(names, :ok, &robot(folder, &1, options["force"] || false))
     end
   end
 

@@ -8,27 +8,24 @@ defmodule Mix.Tasks.Fleet.Secret do
 
   FILE is `convoy.secret` in the current folder by default, which git ignores.
 
-  Options:
-
-    * `--force` - overwrite an existing file; every robot then needs the new one
-    * `--help` - this text
+  `--help` lists the options.
   """
   use Mix.Task
   alias Mesh.Secret
 
+  @options [{"force", nil, nil, "overwrite an existing file; every robot then needs the new one"}]
+
   @impl Mix.Task
-  def run(words) do
-    parser = [strict: [force: :boolean, help: :boolean]]
-    Hal.CommandOutput.run("fleet.secret", words, @moduledoc, parser, &make/2)
-  end
+  def run(words),
+    do: Hal.Cli.Command.run("fleet.secret", words, {@moduledoc, @options}, &make/2)
 
   defp make(_options, [_, _ | _] = files),
     do: {:error, "one file, not #{length(files)}: #{Enum.join(files, " ")}"}
 
-  defp make(options, files) do
+  defp make(given, files) do
     path = List.first(files) || Secret.default_path()
 
-    with {:ok, secret} <- Secret.create(path, options[:force] || false),
+    with {:ok, secret} <- Secret.create(path, given != []),
          do:
            Mix.shell().info(
              "#{path} made, fingerprint #{secret.fingerprint}; copy it to every robot"

@@ -35,7 +35,7 @@ defmodule Mix.Tasks.Fleet.CertsTest do
              "robots are missing: give their names, or --fleet FILE"
 
     assert refusal(CertsTask, ["--colour"]) ==
-             "unknown option --colour; known are --fleet, --out, --force, --help"
+             "fleet.certs: unknown option --colour; known are --fleet, --out, --force, --help"
 
     assert refusal(CertsTask, ["../mag1", "--out", out]) =~ ~s("../mag1" is not a robot's name)
     assert refusal(CertsTask, ["--fleet", "/nowhere"]) =~ "cannot be read: no such file"

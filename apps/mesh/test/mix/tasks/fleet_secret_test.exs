@@ -17,7 +17,7 @@ defmodule Mix.Tasks.Fleet.SecretTest do
 
   test "wrong words are one line" do
     assert refusal(SecretTask, ["--colour"]) ==
-             "unknown option --colour; known are --force, --help"
+             "fleet.secret: unknown option --colour; known are --force, --help"
 
     assert refusal(SecretTask, ["one", "two"]) == "one file, not 2: one two"
     SecretTask.run(["--help"])

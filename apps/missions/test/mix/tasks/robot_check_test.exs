@@ -121,7 +121,10 @@ defmodule Mix.Tasks.Robot.CheckTest do
              "none.exs: no such file or directory"
            ]
 
-    assert refused(Check, ["--colour"]) == ["unknown option --colour; known are --help"]
+    assert refused(Check, ["--colour"]) == [
+             "robot.check: unknown option --colour; known are --help"
+           ]
+
     Check.run(["--help"])
     assert [_well | _lines] = said()
   end

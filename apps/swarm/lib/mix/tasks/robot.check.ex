@@ -10,9 +10,7 @@ defmodule Mix.Tasks.Robot.Check do
   `file:line: key: what is allowed`; the exit status is then 1. An allowed but unusual value gets
   a WARNING, with the usual value. `docs/robots.md` describes the keys.
 
-  Options:
-
-    * `--help` - this text
+  `--help` lists the options.
   """
   use Mix.Task
   alias Robot.File.Summary
@@ -20,7 +18,7 @@ defmodule Mix.Tasks.Robot.Check do
 
   @impl Mix.Task
   def run(words) do
-    Hal.CommandOutput.run("robot.check", words, @moduledoc, [strict: [help: :boolean]], fn
+    Hal.Cli.Command.run("robot.check", words, {@moduledoc, []}, fn
       _options, [] -> files(Path.wildcard("config/robots/*.exs"))
       _options, files -> files(files)
     end)
@@ -29,8 +27,6 @@ defmodule Mix.Tasks.Robot.Check do
   defp files([]), do: {:error, "no robot file is in config/robots; name one"}
 
   defp files(files) do
-    # Their drivers and missions may be the project's own.
-    Hal.CommandBuild.update()
     problems = Enum.flat_map(files, &check/1)
     if problems != [], do: {:error, problems}
   end

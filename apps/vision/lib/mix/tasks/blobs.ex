@@ -9,22 +9,7 @@ defmodule Mix.Tasks.Blobs do
   (ffmpeg's test picture, 50 frames of it) or `lavfi:GENERATOR` (another generator of ffmpeg, such
   as `lavfi:testsrc2=size=64x48`).
 
-  Options:
-
-    * `--colours FILE` - CMVision colour file
-    * `--every N` - search every N-th frame (1)
-    * `--frames N` - end after N frames that were searched; without it, cameras and streams go on
-    * `--json FILE` - one JSON object per frame, each on its own line; `-` is standard output, and
-      then nothing else is written there
-    * `--picture FILE` - the last frame with its blobs drawn in, `.png` or `.jpg`
-    * `--min-area N` - smallest blob in pixels (20)
-    * `--distance NAME=K` - gives the blobs of a colour a distance in metres,
-      `sqrt(K / share of the frame)`; may be given once for each colour
-    * `--backend MODULE` - the `Vision.Backend` to use; by default the fastest that reads the
-      frames
-    * `--unsafe` - opens any source that ffmpeg knows: also filter graphs (`lavfi:`), which can
-      write files, and streams of unknown schemes
-    * `--help` - this text
+  `--help` lists the options.
 
   Pixels count from the top left; `right` and `bottom` are the last ones inside. An odd last
   column of a picture is dropped. For wrong options or input the exit status is 1, with one line.
@@ -36,22 +21,16 @@ defmodule Mix.Tasks.Blobs do
       mix blobs /dev/video0 --colours landmark.txt --json - --frames 100
   """
   use Mix.Task
-  alias Hal.CommandOutput
   alias Vision.Blobs.{Options, Report}
   alias Vision.{Blobs, Colours, Picture}
 
   @impl Mix.Task
-  def run(words), do: CommandOutput.run("blobs", fn -> command(words) end)
-
-  defp command(words) do
-    # The backend may be the project's own.
-    Hal.CommandBuild.update()
-
-    case Options.parse(words) do
-      {:ok, options} -> options |> find() |> finish()
-      {:error, line} -> CommandOutput.refuse(line)
-      :help -> Mix.shell().info(@moduledoc)
-    end
+  def run(words) do
+    Hal.Cli.Command.run("blobs", words, {@moduledoc, Options.table()}, fn given, sources ->
+      with {:ok, options} <- Options.check(given, sources),
+           :halted <- find(options),
+           do: exit({:shutdown, 1})
+    end)
   end
 
   defp find(options) do
@@ -65,11 +44,6 @@ defmodule Mix.Tasks.Blobs do
       conclude(options, summary)
     end
   end
-
-  defp finish(:ok), do: :ok
-  defp finish(:halted), do: exit({:shutdown, 1})
-
-  defp finish({:error, line}), do: CommandOutput.refuse(line)
 
   defp looked(output, options, colours) do
     terminal? = output != :table and match?({:ok, _columns}, :io.columns(:standard_error))

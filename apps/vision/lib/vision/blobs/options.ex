@@ -1,9 +1,9 @@
 defmodule Vision.Blobs.Options do
   @moduledoc false
-  # Parses the command line of `mix blobs` into a checked map, or one line that says what is wrong.
+  # The options of `mix blobs`: their table, and what is checked of all of them.
 
   alias Hal.Camera.Source
-  alias Hal.CommandOutput
+  alias Hal.Cli.Parse
 
   @type t :: %{
           source: String.t(),
@@ -18,64 +18,59 @@ defmodule Vision.Blobs.Options do
           distance: %{String.t() => float()}
         }
 
-  @switches [
-    colours: :string,
-    every: :integer,
-    frames: :integer,
-    json: :string,
-    picture: :string,
-    min_area: :integer,
-    backend: :string,
-    distance: :keep,
-    unsafe: :boolean,
-    help: :boolean
-  ]
   @most 1_000_000_000
   # Frames of the endless test picture, unless the options give another number.
   @test_frames 50
 
-  @doc """
-  Parses the words of the command line.
-
-      iex> {:ok, options} = Vision.Blobs.Options.parse(~w(a.png --colours c.txt --distance Red=0.02))
-      iex> {options.source, options.every, options.distance}
-      {"a.png", 1, %{"Red" => 0.02}}
-      iex> Vision.Blobs.Options.parse(~w(a.png --colors c.txt))
-      {:error, "unknown option --colors; did you mean --colours?"}
-      iex> Vision.Blobs.Options.parse(["--help"])
-      :help
-  """
-  @spec parse([String.t()]) :: {:ok, t()} | :help | {:error, String.t()}
-  def parse(words) do
-    with {:ok, given, sources} <-
-           CommandOutput.parse(words, strict: @switches, aliases: [h: :help]),
-         do: check(given, sources)
+  @doc "The options, as `Hal.Cli.Arguments` takes them."
+  @spec table() :: [Hal.Cli.Arguments.option()]
+  def table do
+    [
+      {"colours", "FILE", &Parse.text/1, "CMVision colour file"},
+      {"every", "N", &Parse.whole(&1, 1..@most), "search every N-th frame (1)"},
+      {"frames", "N", &Parse.whole(&1, 1..@most),
+       "end after N frames that were searched; without it, cameras and streams go on"},
+      {"json", "FILE", &writable/1,
+       "one JSON object per frame, each on its own line; - is standard output,\nand then nothing else is written there"},
+      {"picture", "FILE", &picture/1, "the last frame with its blobs drawn in, .png or .jpg"},
+      {"min-area", "N", &Parse.whole(&1, 1..@most), "smallest blob in pixels (20)"},
+      {"distance", "NAME=K", &distance/1,
+       "gives the blobs of a colour a distance in metres,\nsqrt(K / share of the frame); once for each colour"},
+      {"backend", "MODULE", &backend/1,
+       "the Vision.Backend to use; by default the fastest that reads the frames"},
+      {"unsafe", nil, nil,
+       "opens any source that ffmpeg knows: also filter graphs (lavfi:), which can\nwrite files, and streams of unknown schemes"}
+    ]
   end
 
-  defp check(given, sources) do
+  @doc """
+  Checks the options of a command line, and its other words: the source.
+
+      iex> {:ok, options} = Vision.Blobs.Options.check([{"colours", "c.txt"}, {"distance", {"Red", 0.02}}], ["a.png"])
+      iex> {options.source, options.every, options.distance}
+      {"a.png", 1, %{"Red" => 0.02}}
+      iex> Vision.Blobs.Options.check([], ["a.png"])
+      {:error, "--colours FILE is missing: a CMVision colour file"}
+  """
+  @spec check([{String.t(), term()}], [String.t()]) :: {:ok, t()} | {:error, String.t()}
+  def check(pairs, sources) do
+    given = Map.new(pairs)
+
     with {:ok, source} <- one_source(sources),
-         :ok <- safe(source, given[:unsafe]),
-         :ok <- needed(given[:colours]),
-         :ok <- positive("--every", given[:every]),
-         :ok <- positive("--frames", given[:frames]),
-         :ok <- positive("--min-area", given[:min_area]),
-         :ok <- picture(given[:picture]),
-         :ok <- writable("--picture", given[:picture]),
-         :ok <- writable("--json", given[:json]),
-         {:ok, backend} <- backend(given[:backend]),
-         {:ok, distance} <- distances(Keyword.get_values(given, :distance)) do
+         :ok <- safe(source, given["unsafe"]),
+         :ok <- needed(given["colours"]) do
       {:ok,
        %{
          source: source,
-         colours: given[:colours],
-         every: given[:every] || 1,
-         frames: given[:frames] || if(source == "testsrc", do: @test_frames),
-         json: given[:json],
-         picture: given[:picture],
-         min_area: given[:min_area] || 20,
-         backend: backend,
-         unsafe: given[:unsafe] || false,
-         distance: distance
+         colours: given["colours"],
+         every: given["every"] || 1,
+         frames: given["frames"] || if(source == "testsrc", do: @test_frames),
+         json: given["json"],
+         picture: given["picture"],
+         min_area: given["min-area"] || 20,
+         backend: given["backend"],
+         unsafe: given["unsafe"] || false,
+         distance: for({"distance", {name, constant}} <- pairs, into: %{}, do: {name, constant})
        }}
     end
   end
@@ -98,61 +93,36 @@ defmodule Vision.Blobs.Options do
     end
   end
 
-  defp needed(""), do: needed(nil)
   defp needed(nil), do: {:error, "--colours FILE is missing: a CMVision colour file"}
   defp needed(_path), do: :ok
 
-  defp positive(_option, nil), do: :ok
-  defp positive(_option, value) when value in 1..@most, do: :ok
-
-  defp positive(option, value),
-    do: {:error, "#{option}: expected whole numbers from 1 to #{@most}, got #{value}"}
-
-  defp picture(nil), do: :ok
-
   defp picture(path) do
     if String.downcase(Path.extname(path)) in [".png", ".jpg", ".jpeg"],
-      do: :ok,
-      else: {:error, "--picture: expected names ending in .png or .jpg, got #{inspect(path)}"}
+      do: writable(path),
+      else: {:error, "names ending in .png or .jpg"}
   end
 
-  defp writable(_option, path) when path in [nil, "-"], do: :ok
+  defp writable("-"), do: {:ok, "-"}
 
-  defp writable(option, path) do
+  defp writable(path) do
     cond do
-      path == "" ->
-        {:error, "#{option}: expected the name of a file, got \"\""}
-
-      File.dir?(path) ->
-        {:error, "#{option}: expected a file, got #{inspect(path)}, a folder"}
-
-      not File.dir?(Path.dirname(path)) ->
-        {:error, "#{option} #{path}: no folder #{Path.dirname(path)}"}
-
-      true ->
-        :ok
+      path == "" -> {:error, "the name of a file"}
+      File.dir?(path) -> {:error, "a file, not a folder"}
+      not File.dir?(Path.dirname(path)) -> {:error, "a file in a folder that exists"}
+      true -> {:ok, path}
     end
   end
-
-  defp backend(nil), do: {:ok, nil}
 
   # The colours check whether it is a backend.
   defp backend(name) do
     with :error <- Hal.Options.ModuleLookup.module(name),
-         do: {:error, "--backend: expected a module of this build, got #{inspect(name)}"}
+         do: {:error, "a module of this build"}
   end
 
-  defp distances(texts) do
-    Enum.reduce_while(texts, {:ok, %{}}, fn text, {:ok, distances} ->
-      with [name, number] <- String.split(text, "=", parts: 2),
-           {constant, ""} when constant > 0 <- Float.parse(number) do
-        {:cont, {:ok, Map.put(distances, name, constant)}}
-      else
-        _other ->
-          {:halt,
-           {:error,
-            "--distance: expected NAME=K with K above 0, as in Yellow=0.0651, got #{inspect(text)}"}}
-      end
-    end)
+  defp distance(text) do
+    with [name, number] <- String.split(text, "=", parts: 2),
+         {constant, ""} when constant > 0 <- Float.parse(number),
+         do: {:ok, {name, constant}},
+         else: (_other -> {:error, "NAME=K with K above 0, as in Yellow=0.0651"})
   end
 end

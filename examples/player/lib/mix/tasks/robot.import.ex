@@ -12,50 +12,49 @@ defmodule Mix.Tasks.Robot.Import do
   A robot file that cannot start a robot is written too, for you to correct; then the errors are
   listed, and the exit status is 1.
 
-  Options:
-
-    * `-o OUT`, `--out OUT` - where to write it, such as `config/robots/mag2.exs`; never
-      overwrites a file
-    * `--force` - overwrites a file that exists
-    * `--name NAME` - the robot's name; by default that of OUT, else `mag1` or `min1`
-    * `--profile KIND` - `magellan` or `atrv_mini`; by default guessed
-    * `--player N` - 1 for Player 1.x (millimetres, degrees), 2 for later ones (metres); by
-      default found out from the names of the options
-    * `--help` - this text
+  `--help` lists the options.
   """
   use Mix.Task
   alias Hal.Options.Suggest
   alias Robot.File.{Odd, Schema}
 
-  @switches [
-    out: :string,
-    force: :boolean,
-    name: :string,
-    profile: :string,
-    player: :integer,
-    help: :boolean
+  @options [
+    {"out", "OUT", &Hal.Cli.Parse.text/1,
+     "where to write it, such as config/robots/mag2.exs (or -o OUT);\nnever overwrites a file"},
+    {"force", nil, nil, "overwrites a file that exists"},
+    {"name", "NAME", &Hal.Cli.Parse.text/1,
+     "the robot's name; by default that of OUT, else mag1 or min1"},
+    {"profile", "KIND", &__MODULE__.profile/1, "magellan or atrv_mini; by default guessed"},
+    {"player", "N", &__MODULE__.version/1,
+     "1 for Player 1.x (millimetres, degrees), 2 for later ones (metres);\nby default found out from the names of the options"}
   ]
   @largest 1_048_576
 
   @impl Mix.Task
   def run(words) do
-    parser = [strict: @switches, aliases: [o: :out]]
-    Hal.CommandOutput.run("robot.import", words, @moduledoc, parser, &carry_over/2)
+    words = Enum.map(words, &if(&1 == "-o", do: "--out", else: &1))
+    Hal.Cli.Command.run("robot.import", words, {@moduledoc, @options}, &carry_over/2)
   end
 
-  defp carry_over(options, files) do
+  defp carry_over(given, files) do
+    options = Map.new(given)
+
     with {:ok, file} <- one(files),
          {:ok, id} <- name(options),
-         {:ok, profile} <- profile(options[:profile]),
-         {:ok, version} <- version(options[:player]),
-         :ok <- free(options[:out], options[:force]),
+         :ok <- free(options["out"], options["force"]),
          {:ok, text} <- read(file),
-         colours = colours(file, options[:out]),
-         wanted = [file: file, id: id, profile: profile, version: version, colours: colours],
+         colours = colours(file, options["out"]),
+         wanted = [
+           file: file,
+           id: id,
+           profile: options["profile"],
+           version: options["player"],
+           colours: colours
+         ],
          {:ok, result} <- Player.import(text, wanted),
-         :ok <- write(result.text, options[:out]) do
-      tell(result, file, options[:out])
-      judge(result.text, file, options[:out])
+         :ok <- write(result.text, options["out"]) do
+      tell(result, file, options["out"])
+      judge(result.text, file, options["out"])
     end
   end
 
@@ -89,16 +88,18 @@ defmodule Mix.Tasks.Robot.Import do
 
   # OUT names the robot unless `--name` does, if OUT is a robot's name at all.
   defp name(options) do
-    named = if out = options[:out], do: find(Path.basename(out, ".exs"))
-    asked = if name = options[:name], do: find(name)
+    named = if out = options["out"], do: find(Path.basename(out, ".exs"))
+    asked = if name = options["name"], do: find(name)
 
     cond do
-      options[:name] == nil ->
+      options["name"] == nil ->
         {:ok, named}
 
       asked == nil ->
-        hint = Suggest.hint(options[:name], Enum.map(Enum.take(Schema.fleet(), 9), &to_string/1))
-        {:error, "--name #{options[:name]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
+        hint = Suggest.hint(options["name"], Enum.map(Enum.take(Schema.fleet(), 9), &to_string/1))
+
+        {:error,
+         "--name #{options["name"]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
 
       named not in [nil, asked] ->
         {:error, "--name #{asked} does not match a file named #{named}.exs"}
@@ -110,19 +111,15 @@ defmodule Mix.Tasks.Robot.Import do
 
   defp find(name), do: Enum.find(Schema.fleet(), &(Atom.to_string(&1) == name))
 
-  defp profile(nil), do: {:ok, nil}
-  defp profile("magellan"), do: {:ok, :magellan}
-  defp profile("atrv_mini"), do: {:ok, :atrv_mini}
+  @doc false
+  @spec profile(String.t()) :: {:ok, atom()} | {:error, Hal.Cli.Arguments.allowed()}
+  def profile(text), do: Hal.Cli.Parse.choice(text, magellan: :magellan, atrv_mini: :atrv_mini)
 
-  defp profile(other) do
-    hint = Suggest.hint(other, ["magellan", "atrv_mini"])
-    {:error, "--profile: expected magellan or atrv_mini, got #{other}#{hint}"}
-  end
-
-  defp version(version) when version in [nil, 1, 2], do: {:ok, version}
-
-  defp version(other),
-    do: {:error, "--player: expected 1 for 1.x or 2 for later ones, got #{other}"}
+  @doc false
+  @spec version(String.t()) :: {:ok, 1 | 2} | {:error, String.t()}
+  def version("1"), do: {:ok, 1}
+  def version("2"), do: {:ok, 2}
+  def version(_other), do: {:error, "1 for 1.x or 2 for later ones"}
 
   defp free(nil, _force), do: :ok
   defp free(_out, true), do: :ok

@@ -5,10 +5,10 @@ defmodule Mix.Tasks.Soak do
   alias Soak.Main
 
   @impl Mix.Task
-  def run(arguments), do: Hal.CommandOutput.run("soak", fn -> soak(arguments) end)
+  def run(arguments), do: Hal.Cli.Command.guard("soak", fn -> soak(arguments) end)
 
   defp soak(arguments) do
-    Hal.CommandBuild.update()
+    Hal.Cli.Command.update()
 
     case Main.arguments(arguments) do
       {:ok, what} ->

@@ -1,7 +1,8 @@
-defmodule Hal.CommandOutputTest do
+defmodule Hal.Cli.CommandTest do
   use ExUnit.Case, async: true
-  alias Hal.CommandOutput
-  doctest Hal.CommandOutput
+  alias Hal.Cli.Command
+  doctest Hal.Cli.Arguments
+  doctest Hal.Cli.Parse
 
   # Of what the compiler cannot see. The calls below are no tail calls, of which nothing is left in the stack.
   defp any(term), do: Process.get(:nothing, term)
@@ -21,14 +22,14 @@ defmodule Hal.CommandOutputTest do
     for {error, command} <- fails do
       {raised, stacktrace} =
         try do
-          CommandOutput.run("a command", command)
+          Command.guard("a command", command)
         rescue
           raised -> {raised, __STACKTRACE__}
         end
 
       assert raised.__struct__ == error
       places = for {_module, _f, _a, at} <- stacktrace, do: "#{at[:file]}"
-      assert Enum.find(places, &(&1 =~ "command_output")) =~ "test/hal/command_output_test.exs"
+      assert Enum.find(places, &(&1 =~ "command_test")) =~ "test/hal/cli/command_test.exs"
     end
   end
 end

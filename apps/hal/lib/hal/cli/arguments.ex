@@ -1,4 +1,4 @@
-defmodule Console.Cli.Arguments do
+defmodule Hal.Cli.Arguments do
   @moduledoc """
   Reads the arguments of a command by a list of options. Pure.
 
@@ -21,10 +21,10 @@ defmodule Console.Cli.Arguments do
   @doc """
   The values in the order in which they were given, or one line for each error.
 
-      iex> count = {"count", "N", &Console.Cli.Parse.whole(&1, 1..9), "how many"}
-      iex> Console.Cli.Arguments.parse(~w(--count 3), [count])
+      iex> count = {"count", "N", &Hal.Cli.Parse.whole(&1, 1..9), "how many"}
+      iex> Hal.Cli.Arguments.parse(~w(--count 3), [count])
       {:ok, [{"count", 3}]}
-      iex> Console.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
+      iex> Hal.Cli.Arguments.parse(~w(--count=0 --cuont 2), [count])
       {:error,
        [
          ~s(--count: expected a whole number from 1 to 9, got "0"),
@@ -44,10 +44,24 @@ defmodule Console.Cli.Arguments do
   end
 
   @doc """
+  The same for a command that takes words, too: the values, and the words between them.
+
+      iex> every = {"every", "N", &Hal.Cli.Parse.whole(&1, 1..9), "each how many"}
+      iex> Hal.Cli.Arguments.parse_words(~w(a.png --every 2 b.png), [every])
+      {:ok, [{"every", 2}], ~w(a.png b.png)}
+  """
+  @spec parse_words([String.t()], [option()]) ::
+          {:ok, [{String.t(), term()}], words :: [String.t()]} | {:error, [String.t()]}
+  def parse_words(arguments, options) do
+    {words, rest} = words(arguments, options)
+    with {:ok, pairs} <- parse(rest, options), do: {:ok, pairs, words}
+  end
+
+  @doc """
   Splits arguments into words that stand alone and options with their values, for a command that takes files.
 
       iex> options = [{"record", "DIR", &{:ok, &1}, ""}, {"quiet", nil, nil, ""}]
-      iex> Console.Cli.Arguments.words(~w(a.exs --record out --quiet b.exs --record=c d.exs), options)
+      iex> Hal.Cli.Arguments.words(~w(a.exs --record out --quiet b.exs --record=c d.exs), options)
       {~w(a.exs b.exs d.exs), ~w(--record out --quiet --record=c)}
   """
   @spec words([String.t()], [option()]) :: {words :: [String.t()], rest :: [String.t()]}
@@ -137,7 +151,7 @@ defmodule Console.Cli.Arguments do
   @doc """
   The error for a text that is not what is allowed, in the words of `Hal.Options`.
 
-      iex> Console.Cli.Arguments.refuse("--map", "hal", {"hall or arena", "; did you mean hall?"})
+      iex> Hal.Cli.Arguments.refuse("--map", "hal", {"hall or arena", "; did you mean hall?"})
       {:error, ~s(--map: expected hall or arena, got "hal"; did you mean hall?)}
   """
   @spec refuse(String.t(), String.t(), allowed()) :: {:error, String.t()}
@@ -151,13 +165,19 @@ defmodule Console.Cli.Arguments do
   # The value of an unknown option is skipped too, so that one mistake gives one line.
   defp unknown(name, inline, rest, options) do
     names = Enum.map(options, &("--" <> elem(&1, 0)))
-    error = {:error, "unknown option --#{name}#{Suggest.hint("--" <> name, names)}"}
+    error = {:error, "unknown option --#{name}#{hint("--" <> name, names)}"}
 
     case rest do
       ["--" <> _ | _] -> [error | read(rest, options)]
       [_value | rest] when inline == nil -> [error | read(rest, options)]
       rest -> [error | read(rest, options)]
     end
+  end
+
+  # So few are named all.
+  defp hint(word, names) do
+    with "" when length(names) <= 12 <- Suggest.hint(word, names),
+         do: "; known are #{Enum.join(names, ", ")}"
   end
 
   defp known?(word, options), do: List.keymember?(options, word, 0)

@@ -1,26 +1,20 @@
-defmodule Console.Cli.Parse do
+defmodule Hal.Cli.Parse do
   @moduledoc """
-  Parses text into checked values: numbers, points, choices, fleets. Pure.
+  Parses text into checked values: numbers, points, choices. Pure.
 
   Each function returns `{:ok, value}` or `{:error, what_is_allowed}`, with a hint if there is
   one. Numbers are plain decimals with few digits, so "nan", "inf" and "1e999" are not even
   numbers.
   """
 
-  alias Swarm.Formation
-
   @longest 12
-
-  @doc "The formations by name."
-  @spec formations() :: [String.t()]
-  def formations, do: Enum.map(Formation.kinds(), &Atom.to_string/1)
 
   @doc """
   A whole number in a range.
 
-      iex> Console.Cli.Parse.whole("6", 1..100)
+      iex> Hal.Cli.Parse.whole("6", 1..100)
       {:ok, 6}
-      iex> Console.Cli.Parse.whole("1e9", 1..100)
+      iex> Hal.Cli.Parse.whole("1e9", 1..100)
       {:error, "a whole number from 1 to 100"}
   """
   @spec whole(String.t(), Range.t()) :: {:ok, integer()} | {:error, String.t()}
@@ -34,11 +28,21 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
+  Any text but none: a name, a file.
+
+      iex> {Hal.Cli.Parse.text("a.txt"), Hal.Cli.Parse.text("")}
+      {{:ok, "a.txt"}, {:error, "a text"}}
+  """
+  @spec text(String.t()) :: {:ok, String.t()} | {:error, String.t()}
+  def text(""), do: {:error, "a text"}
+  def text(text), do: {:ok, text}
+
+  @doc """
   Whole numbers within bounds, with commas between.
 
-      iex> Console.Cli.Parse.wholes("6,20", 1..100)
+      iex> Hal.Cli.Parse.wholes("6,20", 1..100)
       {:ok, [6, 20]}
-      iex> Console.Cli.Parse.wholes("6,200", 1..100)
+      iex> Hal.Cli.Parse.wholes("6,200", 1..100)
       {:error, "whole numbers from 1 to 100, with commas between"}
   """
   @spec wholes(String.t(), Range.t()) :: {:ok, [integer(), ...]} | {:error, String.t()}
@@ -53,9 +57,9 @@ defmodule Console.Cli.Parse do
   @doc """
   A number between two bounds.
 
-      iex> Console.Cli.Parse.number("-0.5", -1, 1)
+      iex> Hal.Cli.Parse.number("-0.5", -1, 1)
       {:ok, -0.5}
-      iex> Console.Cli.Parse.number("nan", 0, 1)
+      iex> Hal.Cli.Parse.number("nan", 0, 1)
       {:error, "a number from 0 to 1"}
   """
   @spec number(String.t(), number(), number()) :: {:ok, float()} | {:error, String.t()}
@@ -70,13 +74,13 @@ defmodule Console.Cli.Parse do
   @doc """
   One of some words, as the atom it stands for.
 
-      iex> Console.Cli.Parse.choice("on", on: true, off: false)
+      iex> Hal.Cli.Parse.choice("on", on: true, off: false)
       {:ok, true}
-      iex> Console.Cli.Parse.choice("of", on: true, off: false)
+      iex> Hal.Cli.Parse.choice("of", on: true, off: false)
       {:error, {"on or off", "; did you mean off?"}}
   """
   @spec choice(String.t(), keyword()) ::
-          {:ok, term()} | {:error, Console.Cli.Arguments.allowed()}
+          {:ok, term()} | {:error, Hal.Cli.Arguments.allowed()}
   def choice(text, words) do
     names = Enum.map(words, fn {word, _value} -> Atom.to_string(word) end)
 
@@ -92,9 +96,9 @@ defmodule Console.Cli.Parse do
   @doc """
   A place, `X,Y` in metres.
 
-      iex> Console.Cli.Parse.point("-2,1.5")
+      iex> Hal.Cli.Parse.point("-2,1.5")
       {:ok, {-2.0, 1.5}}
-      iex> Console.Cli.Parse.point("2;1")
+      iex> Hal.Cli.Parse.point("2;1")
       {:error, "X,Y in metres, each from -1000 to 1000"}
   """
   @spec point(String.t()) :: {:ok, {float(), float()}} | {:error, String.t()}
@@ -111,10 +115,10 @@ defmodule Console.Cli.Parse do
   @doc """
   Something at a simulated second, `WHAT@T`; `check` checks `WHAT`.
 
-      iex> Console.Cli.Parse.at("3,2@40", &Console.Cli.Parse.point/1, "X,Y@T")
+      iex> Hal.Cli.Parse.at("3,2@40", &Hal.Cli.Parse.point/1, "X,Y@T")
       {:ok, {{3.0, 2.0}, 40.0}}
   """
-  @spec at(String.t(), Console.Cli.Arguments.check(), String.t()) ::
+  @spec at(String.t(), Hal.Cli.Arguments.check(), String.t()) ::
           {:ok, {term(), float()}} | {:error, String.t()}
   def at(text, check, form) do
     with [what, time] <- String.split(text, "@"),
@@ -127,40 +131,9 @@ defmodule Console.Cli.Parse do
   end
 
   @doc """
-  A formation and its spacing in metres, `KIND[:SPACING]`.
-
-      iex> Console.Cli.Parse.formation("wedge:1.2")
-      {:ok, {:wedge, 1.2}}
-      iex> Console.Cli.Parse.formation("column")
-      {:ok, {:column, 1.0}}
-  """
-  @spec formation(String.t()) ::
-          {:ok, {atom(), float()}} | {:error, Console.Cli.Arguments.allowed()}
-  def formation(text) do
-    {kind, spacing} =
-      case String.split(text, ":", parts: 2) do
-        [kind] -> {kind, "1.0"}
-        [kind, spacing] -> {kind, spacing}
-      end
-
-    known = Enum.find(Formation.kinds(), &(Atom.to_string(&1) == kind))
-
-    with {:kind, true} <- {:kind, known != nil},
-         {:ok, spacing} <- number(spacing, 0.8, 5.0) do
-      {:ok, {known, spacing}}
-    else
-      {:kind, false} ->
-        {:error, {either(formations()), Hal.Options.Suggest.hint(kind, formations())}}
-
-      {:error, _} ->
-        {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}
-    end
-  end
-
-  @doc """
   A span of whole numbers, `A-B`.
 
-      iex> Console.Cli.Parse.span("1-40", 0..100)
+      iex> Hal.Cli.Parse.span("1-40", 0..100)
       {:ok, 1..40}
   """
   @spec span(String.t(), Range.t()) :: {:ok, Range.t()} | {:error, String.t()}
@@ -175,9 +148,9 @@ defmodule Console.Cli.Parse do
   @doc """
   The entries of a table that people name, in its order; each entry has a `:name`.
 
-      iex> Console.Cli.Parse.named("b,a", [%{name: :a}, %{name: :b}, %{name: :c}])
+      iex> Hal.Cli.Parse.named("b,a", [%{name: :a}, %{name: :b}, %{name: :c}])
       {:ok, [%{name: :a}, %{name: :b}]}
-      iex> Console.Cli.Parse.named("d", [%{name: :a}, %{name: :b}])
+      iex> Hal.Cli.Parse.named("d", [%{name: :a}, %{name: :b}])
       {:error, "names of a, b, with commas between"}
   """
   @spec named(String.t(), [entry]) :: {:ok, [entry]} | {:error, String.t()}
@@ -194,7 +167,7 @@ defmodule Console.Cli.Parse do
   @doc """
   Lists words as people write a choice.
 
-      iex> Console.Cli.Parse.either(~w(hall hospital arena))
+      iex> Hal.Cli.Parse.either(~w(hall hospital arena))
       "hall, hospital or arena"
   """
   @spec either([String.t()]) :: String.t()
@@ -218,9 +191,9 @@ defmodule Console.Cli.Parse do
   @doc """
   A folder, which is made if it does not exist; relative to `from`.
 
-      iex> Console.Cli.Parse.folder("tables", "/tmp")
+      iex> Hal.Cli.Parse.folder("tables", "/tmp")
       {:ok, "/tmp/tables"}
-      iex> Console.Cli.Parse.folder("", "/tmp")
+      iex> Hal.Cli.Parse.folder("", "/tmp")
       {:error, "the name of a folder"}
   """
   @spec folder(String.t(), Path.t()) :: {:ok, Path.t()} | {:error, String.t()}
