@@ -13,7 +13,7 @@ if why_not, do: Mix.raise("no figures: " <> why_not)
 seconds = System.argv() |> List.first("20") |> String.to_integer()
 
 {:ok, options} = Options.parse(~w(--robots 100 --seed 3 --blobs direct --formation circle))
-{:ok, live} = Live.Trial.start_link(Lab.Trial, Options.trial(options), Live.Pace.new(1.0))
+{:ok, live} = Live.Trial.start_link(Lab.Trial, Options.trial(options), Console.Pace.new(1.0))
 {:ok, _page, url} = Page.start_link(module: Live.Trial, live: live, robots: options.robots)
 browser = Browser.open({1280, 800})
 Browser.go(browser, url)

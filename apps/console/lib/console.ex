@@ -6,7 +6,7 @@ defmodule Console do
   `Console.Prompt` has checked. No robot knows a view, and no view decides anything.
 
       iex> Console.Prompt.parse("goto mag1 1,2", [:mag1])
-      {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
+      {:ok, {:tell, [:mag1], {:goto, 1.0, 2.0, nil}}}
       iex> Console.Prompt.parse("fromation wedge", [:mag1])
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
 

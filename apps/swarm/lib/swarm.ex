@@ -31,7 +31,7 @@ defmodule Swarm do
   alias Swarm.{Behaviours, Commands, Formation, Replacement, Status}
   alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
-  alias Swarm.Membership.Matrix
+  alias Swarm.Status.Matrix
   alias Swarm.Missions.Text
   alias Swarm.Discovery.{Presence, Search}
 
@@ -155,10 +155,10 @@ defmodule Swarm do
   end
 
   @doc """
-  Gives a text command (`Robot.Command`) to a robot, to a list of them, or to `:all`.
+  Gives a command (`Robot.Command`), as text or as its term, to a robot, to a list of them, or to `:all`.
 
       Swarm.tell(:mag1, "goto:2.0:1.0")
-      Swarm.tell([:mag1, :mag2], "move:0.2:0.1")
+      Swarm.tell([:mag1, :mag2], {:move, 0.2, 0.1})
       Swarm.tell(:all, "stop")
       Swarm.tell(:all, "start:patrol:period=90")
       Swarm.tell(:all, "replace:patrol:period=90")
@@ -173,12 +173,17 @@ defmodule Swarm do
   `subscribe`, `unsubscribe`, `position` and `blob` are commands between robots, and are refused:
   every heartbeat carries what they would bring.
   """
-  @spec tell(robot() | [robot()] | :all, String.t()) :: answer() | {:ok, line :: String.t()}
+  @spec tell(robot() | [robot()] | :all, String.t() | Command.t() | {:replace, String.t()}) ::
+          answer() | {:ok, line :: String.t()}
   def tell(to, "replace:" <> mission), do: replace(to, mission)
+  def tell(to, {:replace, mission}), do: replace(to, mission)
 
   def tell(to, text) when is_binary(text) do
     with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end
+
+  def tell(to, command) when is_tuple(command) or (is_atom(command) and command != nil),
+    do: command(to, command)
 
   def tell(_to, other),
     do:

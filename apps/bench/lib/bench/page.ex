@@ -56,7 +56,11 @@ defmodule Bench.Page do
     with {:ok, options} <-
            Console.Options.parse(["--robots", "#{length(robots)}", "--blobs", "direct"]),
          {:ok, live} <-
-           Live.Trial.start_link(Lab.Trial, Console.Options.trial(options), Live.Pace.new(:max)),
+           Live.Trial.start_link(
+             Lab.Trial,
+             Console.Options.trial(options),
+             Console.Pace.new(:max)
+           ),
          {:ok, page, url} <- Page.start_link(module: Live.Trial, live: live, robots: robots) do
       note.("the fleet forms in lockstep")
       formed(fn -> Live.Trial.scene(live).formed? end, Hal.Clock.now_ms() + @form_ms)

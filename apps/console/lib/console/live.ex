@@ -12,10 +12,10 @@ defmodule Console.Live do
           {:kill, :leader | atom()}
           | {:formation, {atom(), float() | nil}}
           | {:landmark, Pose.point() | :none}
-          | {:tell, target(), String.t()}
+          | {:tell, target(), Robot.Command.t() | {:replace, mission :: String.t()}}
           | :estop
           | :reset
-          | {:pace, Console.Live.Pace.command()}
+          | {:pace, Console.Pace.command()}
 
   @doc "The fleet as it is now."
   @callback scene(live :: term()) :: Sim.Scene.t()
@@ -54,7 +54,7 @@ defmodule Console.Live do
   @doc "Status lines of all its robots, or of one."
   @callback status(live :: term(), :all | atom()) :: [String.t()]
 
-  @doc "What one robot knows and does, as the page shows it (`Console.Page.About`); `nil` if that is not known here."
+  @doc "What one robot knows and does, as the page shows it (`Console.About`); `nil` if that is not known here."
   @callback about(live :: term(), atom()) :: map() | nil
 
   @optional_callbacks offers: 1, notice: 1, status: 2, about: 2

@@ -7,7 +7,7 @@ defmodule Console.Options do
   alias Console.Options.Page
   alias Console.Cli.MapName
   alias Hal.Cli.Parse
-  alias Console.Live.Pace
+  alias Console.Pace
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
   alias Swarm.Missions

@@ -6,7 +6,7 @@ defmodule Console.Prompt do
   """
   alias Console.Fleet
   alias Hal.Cli.Parse
-  alias Console.Live.Pace
+  alias Console.Pace
   alias Console.Prompt.Stop
   alias Hal.Options.Suggest
   alias Robot.Command
@@ -37,7 +37,7 @@ defmodule Console.Prompt do
       iex> Console.Prompt.parse("kill leader", [:mag1])
       {:ok, {:kill, :leader}}
       iex> Console.Prompt.parse("goto mag1 1,2", [:mag1])
-      {:ok, {:tell, [:mag1], "goto:1.0:2.0"}}
+      {:ok, {:tell, [:mag1], {:goto, 1.0, 2.0, nil}}}
       iex> Console.Prompt.parse("fromation wedge", [:mag1])
       {:error, ~s(unknown command "fromation"; did you mean formation?)}
       iex> Console.Prompt.parse("step 10", [:mag1])
@@ -87,7 +87,7 @@ defmodule Console.Prompt do
   """
   @spec kind(parsed()) :: :stop | :order | :view
   def kind(:estop), do: :stop
-  def kind({:tell, _target, word}) when word in ["stop", "disarm"], do: :stop
+  def kind({:tell, _target, command}) when command in [:stop, :disarm], do: :stop
   def kind({view, _what}) when view in [:drive, :gamepad, :status], do: :view
   def kind(view) when view in [:help, :nodes, :page, :status, :quit, :nothing], do: :view
   def kind(_command), do: :order
@@ -97,7 +97,7 @@ defmodule Console.Prompt do
 
       iex> Console.Prompt.said("estop now!", :estop)
       "estop now! (estop)"
-      iex> Console.Prompt.said(" goto mag1 1,2 ", {:tell, [:mag1], "goto:1.0:2.0"})
+      iex> Console.Prompt.said(" goto mag1 1,2 ", {:tell, [:mag1], {:goto, 1.0, 2.0, nil}})
       "goto mag1 1,2"
   """
   @spec said(String.t(), parsed()) :: String.t()
@@ -109,10 +109,10 @@ defmodule Console.Prompt do
 
   defp meant(:estop), do: ["estop"]
 
-  defp meant({:tell, :all, stop}) when stop in ["stop", "disarm"],
-    do: ["#{stop} all", stop, "all #{stop}"]
+  defp meant({:tell, :all, stop}) when stop in [:stop, :disarm],
+    do: ["#{stop} all", "#{stop}", "all #{stop}"]
 
-  defp meant({:tell, robots, stop}) when stop in ["stop", "disarm"] do
+  defp meant({:tell, robots, stop}) when stop in [:stop, :disarm] do
     names = Enum.join(robots, " ")
     ["#{stop} #{names}", "#{names} #{stop}"]
   end
@@ -232,7 +232,7 @@ defmodule Console.Prompt do
 
   defp command("goto", [name | rest], robots) when rest != [] do
     with {:ok, robot} <- robot(name, robots) do
-      with_point(rest, "goto NAME X,Y", fn {x, y} -> {:tell, [robot], "goto:#{x}:#{y}"} end)
+      with_point(rest, "goto NAME X,Y", fn {x, y} -> {:tell, [robot], {:goto, x, y, nil}} end)
     end
   end
 
@@ -244,7 +244,7 @@ defmodule Console.Prompt do
          {:ok, leader} <- robot(leader, robots) do
       if follower == leader,
         do: {:error, "a robot cannot follow itself"},
-        else: {:ok, {:tell, [follower], "followtheleader:#{leader}"}}
+        else: {:ok, {:tell, [follower], {:follow_the_leader, leader}}}
     end
   end
 
@@ -261,8 +261,8 @@ defmodule Console.Prompt do
   defp command("gamepad", _rest, _robots),
     do: {:error, "gamepad needs one name, or off: gamepad mag1, gamepad mag1 /dev/input/js1"}
 
-  defp command("start", [], _robots), do: {:ok, {:tell, :all, "start"}}
-  defp command("start", ["all"], _robots), do: {:ok, {:tell, :all, "start"}}
+  defp command("start", [], _robots), do: {:ok, {:tell, :all, :start}}
+  defp command("start", ["all"], _robots), do: {:ok, {:tell, :all, :start}}
 
   defp command("start", [mission | rest], robots) when length(rest) < 2 do
     if mission in ["all" | Enum.map(robots, &to_string/1)],
@@ -284,7 +284,7 @@ defmodule Console.Prompt do
   defp command("replace", _rest, _robots),
     do: {:error, "replace needs a mission: replace flock, replace mag1 patrol:period=90"}
 
-  defp command("stop", [name], robots), do: with_robot(name, robots, &{:tell, [&1], "stop"})
+  defp command("stop", [name], robots), do: with_robot(name, robots, &{:tell, [&1], :stop})
 
   defp command(word, [name], robots) when word in ["arm", "disarm", "acknowledge"],
     do: tell(name, [word], robots)
@@ -357,11 +357,12 @@ defmodule Console.Prompt do
     with {:ok, robot} <- robot(name, robots), do: checked([robot], Enum.join(text, ":"), robots)
   end
 
-  defp checked(target, "replace:" <> _mission = text, _robots), do: {:ok, {:tell, target, text}}
+  defp checked(target, "replace:" <> mission, _robots),
+    do: {:ok, {:tell, target, {:replace, mission}}}
 
   defp checked(target, text, robots) do
     with {:ok, command} <- Command.parse(text, robots),
-         do: {:ok, {:tell, target, Command.to_text(command)}}
+         do: {:ok, {:tell, target, command}}
   end
 
   defp unknown(word, robots) do

@@ -49,14 +49,14 @@ defmodule Console.Teleop do
   The order of a word that was said so long ago, for `c:Console.Live.command/2`; it ends when the word does.
 
       iex> Console.Teleop.order(:mag1, {1.0, -0.5}, :page)
-      {:tell, [:mag1], "move:0.5:-0.5:0.3"}
+      {:tell, [:mag1], {:move, 0.5, -0.5, 0.3}}
       iex> Console.Teleop.order(:mag1, {1.0, -0.5}, :page, 100)
-      {:tell, [:mag1], "move:0.5:-0.5:0.2"}
+      {:tell, [:mag1], {:move, 0.5, -0.5, 0.2}}
   """
   @spec order(atom(), stick(), :page | :gamepad | :terminal, age_ms :: non_neg_integer()) ::
           Console.Live.command()
   def order(robot, {ahead, left}, by, age_ms \\ 0) do
     for_s = max(word_ms(by) - age_ms, 0) / 1_000
-    {:tell, [robot], "move:#{ahead * @speed}:#{left * @turn}:#{for_s}"}
+    {:tell, [robot], {:move, ahead * @speed, left * @turn, for_s}}
   end
 end

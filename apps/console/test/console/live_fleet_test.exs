@@ -13,12 +13,12 @@ defmodule Console.LiveFleetTest do
     monitors = for {_id, pid, _type, _modules} <- parts, do: Process.monitor(pid)
 
     # A question has an answer.
-    assert {:ok, said} = Live.Fleet.command(live, {:tell, :all, "ping"})
+    assert {:ok, said} = Live.Fleet.command(live, {:tell, :all, :ping})
     assert said =~ ~r/^mag61 on .*, up for .*; min61 on /
 
     for command <- [
-          {:tell, [:mag61], "goto:1:1"},
-          {:tell, :all, "start"},
+          {:tell, [:mag61], {:goto, 1, 1, nil}},
+          {:tell, :all, :start},
           {:formation, {:wedge, nil}},
           {:formation, {:line, 1.5}},
           {:landmark, {1.0, 0.5}},
@@ -30,7 +30,7 @@ defmodule Console.LiveFleetTest do
         do: assert({command, {:ok, "accepted"}} == {command, answer})
 
     # A hand on a robot: it drives while there are words, waits when they end, and keeps its mission.
-    assert {:ok, "accepted"} = Live.Fleet.command(live, {:tell, [:min61], "start:teleop"})
+    assert {:ok, "accepted"} = Live.Fleet.command(live, {:tell, [:min61], {:start, "teleop"}})
     word = Console.Teleop.order(:min61, {0.4, 0.0}, :terminal)
     state = fn -> Swarm.status(:min61).state end
 
@@ -50,9 +50,9 @@ defmodule Console.LiveFleetTest do
     for command <- [
           {:kill, :leader},
           {:kill, :mag61},
-          {:tell, [:mag61], "ping"},
+          {:tell, [:mag61], :ping},
           {:tell, :all, "goto:abc:1"},
-          {:tell, [:min61], "goto:99.0:0.0"},
+          {:tell, [:min61], {:goto, 99.0, 0.0, nil}},
           {:landmark, {500.0, 0.0}}
         ] do
       assert {:error, line} = Live.Fleet.command(live, command)

@@ -1,6 +1,6 @@
 defmodule Console.LiveTest do
   use ExUnit.Case, async: true
-  doctest Console.Live.Pace
+  doctest Console.Pace
   alias Console.{FakeTrial, Live, Options, Runs}
 
   defp start(line) do
@@ -18,10 +18,10 @@ defmodule Console.LiveTest do
     assert Live.Trial.scene(live).formation == {:wedge, 1.0}
     assert {:ok, _} = Live.Trial.command(live, {:landmark, {3.0, 2.0}})
     assert {:error, "there is a wall"} = Live.Trial.command(live, {:landmark, {30.0, 2.0}})
-    assert {:ok, _} = Live.Trial.command(live, {:tell, [:mag1], "stop"})
+    assert {:ok, _} = Live.Trial.command(live, {:tell, [:mag1], :stop})
     assert {:ok, _} = Live.Trial.command(live, :estop)
-    assert Live.Trial.command(live, {:tell, [:mag1], "goto:1:2"}) == {:error, "mag1: no"}
-    assert {:error, line} = Live.Trial.command(live, {:tell, :all, "arm"})
+    assert Live.Trial.command(live, {:tell, [:mag1], {:goto, 1, 2, nil}}) == {:error, "mag1: no"}
+    assert {:error, line} = Live.Trial.command(live, {:tell, :all, :arm})
     assert line =~ "no wheels to arm"
     assert Live.Trial.result(live).robots == 3
   end
@@ -30,7 +30,11 @@ defmodule Console.LiveTest do
     line = "--robots 2 --plan known --seed 3"
     {:ok, live} = Live.Trial.start_link(Lab.Trial, Options.trial(Runs.options(line)))
     assert {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
-    tell = &Live.Trial.command(live, {:tell, &1, &2})
+
+    tell = fn to, text ->
+      {:ok, command} = Robot.Command.parse(text, [:mag1, :min1])
+      Live.Trial.command(live, {:tell, to, command})
+    end
 
     assert tell.([:mag1], "goto:99:0") ==
              {:error, "mag1 cannot go to 99.0,0.0: it is outside of the map"}
@@ -38,7 +42,10 @@ defmodule Console.LiveTest do
     assert tell.([:min1], "followtheleader:min1") == {:error, "min1 cannot follow itself"}
     assert {:error, line} = tell.([:mag1], "findblob:pink")
     assert line =~ "mag1 does not know the colour \"pink\"; it looks for "
-    assert {:error, "in lockstep no mission is replaced" <> _} = tell.([:mag1], "replace:flock")
+
+    assert {:error, "in lockstep no mission is replaced" <> _} =
+             Live.Trial.command(live, {:tell, [:mag1], {:replace, "flock"}})
+
     assert tell.([:mag1], "square:2") == {:ok, "accepted"}
     assert %{state: :manual} = Enum.find(Live.Trial.scene(live).robots, &(&1.id == :mag1))
     assert Live.Trial.command(live, {:formation, {:wedge, 1.2}}) == {:ok, "accepted"}
@@ -59,7 +66,7 @@ defmodule Console.LiveTest do
 
   test "it pauses, steps, and goes on at another speed; the run is the same" do
     options = Options.trial(Runs.options("--robots 3 --seed 4"))
-    {:ok, live} = Live.Trial.start_link(FakeTrial, options, Live.Pace.new(:max))
+    {:ok, live} = Live.Trial.start_link(FakeTrial, options, Console.Pace.new(:max))
     _ahead = until(live, fn scene, _pace -> scene.at_ms >= 1_000 end)
     assert {:ok, "paused" <> _} = Live.Trial.command(live, {:pace, :pause})
     paused = Live.Trial.scene(live)

@@ -43,11 +43,11 @@ defmodule Console.OrdersTest do
   test "orders run one after the other; a stop goes past them, and drops those that wait" do
     orders = orders()
     for text <- ["goto mag1 1,1", "goto mag1 2,2", "start"], do: line(orders, text)
-    assert_receive {:told, {:tell, [:mag1], "goto:1.0:1.0"}, first}
+    assert_receive {:told, {:tell, [:mag1], {:goto, 1.0, 1.0, nil}}, first}
     refute_received {:told, _next, _ref}
 
     line(orders, "stop")
-    assert_receive {:told, {:tell, :all, "stop"}, stop}
+    assert_receive {:told, {:tell, :all, :stop}, stop}
     assert_receive {:answer, "goto mag1 2,2", {:error, "not carried out: stopped" <> _}}
     assert_receive {:answer, "start", {:error, "not carried out: stopped" <> _}}
 
@@ -58,7 +58,7 @@ defmodule Console.OrdersTest do
     refute_received {:told, _again, _ref}
     answer(stop)
     assert_receive {:answer, "stop", {:ok, "done"}}
-    assert_receive {:told, {:tell, :all, "stop"}, again}
+    assert_receive {:told, {:tell, :all, :stop}, again}
     for ref <- [first, estop, again], do: answer(ref)
     Orders.settle(orders)
     for text <- ["goto mag1 1,1", "estop", "stop all"], do: assert_received({:answer, ^text, _})
@@ -72,7 +72,7 @@ defmodule Console.OrdersTest do
     assert refusal =~ ~r/^given \d+\.\d s ago and not carried out: at most 0\.5 s are allowed/
 
     line(orders, "stop mag2", now_us() - 60_000_000)
-    assert_receive {:told, {:tell, [:mag2], "stop"}, stop}
+    assert_receive {:told, {:tell, [:mag2], :stop}, stop}
     answer(stop)
 
     {:ok, question} = Line.order("help", nil, [:mag1], {Console.Live.Fleet, nil})
@@ -105,7 +105,7 @@ defmodule Console.OrdersTest do
 
     told = told([])
     assert length(told) <= 8
-    assert {:tell, [:mag2], "goto:3.0:3.0"} = List.last(told)
+    assert {:tell, [:mag2], {:goto, 3.0, 3.0, nil}} = List.last(told)
     assert {:message_queue_len, 0} = Process.info(orders, :message_queue_len)
   end
 
@@ -126,8 +126,8 @@ defmodule Console.OrdersTest do
     assert_receive {:told, _start, start}
     for n <- 1..5, do: word(orders, {n / 5, 0.0})
     answer(start)
-    assert_receive {:told, {:tell, [:mag1], "move:0.5:0.0:" <> for_s}, ref}
-    assert String.to_float(for_s) <= 0.3
+    assert_receive {:told, {:tell, [:mag1], {:move, 0.5, turn, for_s}}, ref}
+    assert for_s <= 0.3 and turn == 0
     answer(ref)
     Orders.settle(orders)
     refute_received {:told, _word, _ref}

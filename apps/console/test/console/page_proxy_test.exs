@@ -19,7 +19,7 @@ defmodule Console.PageProxyTest do
     {:ok, options} =
       "--robots 2 --seed 4 --blobs direct" |> OptionParser.split() |> Options.parse()
 
-    start = {Live.Trial, :start_link, [Lab.Trial, Options.trial(options), Live.Pace.new(:max)]}
+    start = {Live.Trial, :start_link, [Lab.Trial, Options.trial(options), Console.Pace.new(:max)]}
 
     live = start_supervised!(%{id: :live, start: start})
     %{source: [module: Live.Trial, live: live, robots: options.robots]}

@@ -25,7 +25,7 @@ defmodule Console.PageTest do
   # As fast as it goes, in lockstep.
   defp trial(line \\ "--robots 3 --seed 4 --blobs direct") do
     options = options(line)
-    start = {Live.Trial, :start_link, [Lab.Trial, Options.trial(options), Live.Pace.new(:max)]}
+    start = {Live.Trial, :start_link, [Lab.Trial, Options.trial(options), Console.Pace.new(:max)]}
     {options, start_supervised!(%{id: make_ref(), start: start})}
   end
 
@@ -239,7 +239,7 @@ defmodule Console.PageTest do
 
     # In lockstep, in real time.
     defp slow(options),
-      do: Live.Trial.start_link(Lab.Trial, Options.trial(options), Live.Pace.new(1.0))
+      do: Live.Trial.start_link(Lab.Trial, Options.trial(options), Console.Pace.new(1.0))
 
     test "by keyboard alone one comes to everything in order, and can do all of it" do
       options = options("--robots 2 --landmark none")

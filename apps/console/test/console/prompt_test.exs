@@ -26,32 +26,32 @@ defmodule Console.PromptTest do
     assert ok("landmark -3, 2") == {:landmark, {-3.0, 2.0}}
     assert ok("move 3 2") == {:landmark, {3.0, 2.0}}
     assert ok("landmark none") == {:landmark, :none}
-    assert ok("goto mag2 1,2") == {:tell, [:mag2], "goto:1.0:2.0"}
-    assert ok("follow min1 mag2") == {:tell, [:min1], "followtheleader:mag2"}
-    assert ok("stop") == {:tell, :all, "stop"}
-    assert ok("stop min1") == {:tell, [:min1], "stop"}
-    assert ok("start") == {:tell, :all, "start"}
-    assert ok("start all") == {:tell, :all, "start"}
-    assert ok("start mag2") == {:tell, [:mag2], "start"}
+    assert ok("goto mag2 1,2") == {:tell, [:mag2], {:goto, 1.0, 2.0, nil}}
+    assert ok("follow min1 mag2") == {:tell, [:min1], {:follow_the_leader, :mag2}}
+    assert ok("stop") == {:tell, :all, :stop}
+    assert ok("stop min1") == {:tell, [:min1], :stop}
+    assert ok("start") == {:tell, :all, :start}
+    assert ok("start all") == {:tell, :all, :start}
+    assert ok("start mag2") == {:tell, [:mag2], :start}
 
     assert ok("start patrol:period=90,loop=line") ==
-             {:tell, :all, "start:patrol:period=90,loop=line"}
+             {:tell, :all, {:start, "patrol:period=90,loop=line"}}
 
     assert ok("start mag2 landmark:formation=wedge:1.2") ==
-             {:tell, [:mag2], "start:landmark:formation=wedge:1.2"}
+             {:tell, [:mag2], {:start, "landmark:formation=wedge:1.2"}}
 
-    assert ok("start:patrol") == {:tell, :all, "start:patrol"}
-    assert ok("replace flock") == {:tell, :all, "replace:flock"}
-    assert ok("replace all flock") == {:tell, :all, "replace:flock"}
-    assert ok("replace mag2 patrol:period=90") == {:tell, [:mag2], "replace:patrol:period=90"}
-    assert ok("mag2 replace:flock") == {:tell, [:mag2], "replace:flock"}
-    assert ok("mag2 run:drift") == {:tell, [:mag2], "run:drift"}
-    assert ok("mag2 wander") == {:tell, [:mag2], "wander"}
-    assert ok("all square:2") == {:tell, :all, "square:2.0"}
-    assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], "move:0.2:0.1"}
-    assert ok("mag2 MOVE 0.2 0.1") == {:tell, [:mag2], "move:0.2:0.1"}
-    assert ok("all findblob") == {:tell, :all, "findblob"}
-    assert ok("goto:1:2") == {:tell, :all, "goto:1.0:2.0"}
+    assert ok("start:patrol") == {:tell, :all, {:start, "patrol"}}
+    assert ok("replace flock") == {:tell, :all, {:replace, "flock"}}
+    assert ok("replace all flock") == {:tell, :all, {:replace, "flock"}}
+    assert ok("replace mag2 patrol:period=90") == {:tell, [:mag2], {:replace, "patrol:period=90"}}
+    assert ok("mag2 replace:flock") == {:tell, [:mag2], {:replace, "flock"}}
+    assert ok("mag2 run:drift") == {:tell, [:mag2], {:run, "drift"}}
+    assert ok("mag2 wander") == {:tell, [:mag2], :wander}
+    assert ok("all square:2") == {:tell, :all, {:square, 2.0}}
+    assert ok("mag2 move:0.2:0.1") == {:tell, [:mag2], {:move, 0.2, 0.1}}
+    assert ok("mag2 MOVE 0.2 0.1") == {:tell, [:mag2], {:move, 0.2, 0.1}}
+    assert ok("all findblob") == {:tell, :all, {:find_blob, nil}}
+    assert ok("goto:1:2") == {:tell, :all, {:goto, 1.0, 2.0, nil}}
     assert ok("estop") == :estop
     assert ok("reset") == :reset
     assert ok("status") == :status
@@ -96,15 +96,15 @@ defmodule Console.PromptTest do
           "all stop",
           "stop, stop"
         ],
-        do: assert({line, ok(line)} == {line, {:tell, :all, "stop"}})
+        do: assert({line, ok(line)} == {line, {:tell, :all, :stop}})
 
-    assert ok("stop mag1, min1") == {:tell, [:mag1, :min1], "stop"}
-    assert ok("mag2 stop!") == {:tell, [:mag2], "stop"}
+    assert ok("stop mag1, min1") == {:tell, [:mag1, :min1], :stop}
+    assert ok("mag2 stop!") == {:tell, [:mag2], :stop}
 
     for line <- ["disarm", "disarm all", "disarm now"],
-        do: assert(ok(line) == {:tell, :all, "disarm"})
+        do: assert(ok(line) == {:tell, :all, :disarm})
 
-    assert ok("disarm mag2") == {:tell, [:mag2], "disarm"}
+    assert ok("disarm mag2") == {:tell, [:mag2], :disarm}
 
     assert Prompt.said("emergency stop", :estop) == "emergency stop (estop)"
     assert Prompt.said("stpo", ok("stpo")) == "stpo (stop all)"
@@ -113,7 +113,7 @@ defmodule Console.PromptTest do
     for line <- ["stop mag9", "stop the music", "kill estop", "formation halt", "disarm mag9"],
         do: assert({line, error(line) =~ "; F8 and estop stop all robots"} == {line, true})
 
-    for {line, command} <- [{"step", {:pace, {:step, 1}}}, {"start", {:tell, :all, "start"}}],
+    for {line, command} <- [{"step", {:pace, {:step, 1}}}, {"start", {:tell, :all, :start}}],
         do: assert(ok(line) == command)
 
     assert error("stat") =~ "did you mean"
@@ -195,8 +195,8 @@ defmodule Console.PromptTest do
   test "behaviours of a build are run by their names" do
     Application.put_env(:swarm, :behaviours, drift: Robot.Behaviour.Wander)
     on_exit(fn -> Application.delete_env(:swarm, :behaviours) end)
-    assert ok("run mag2 drift") == {:tell, [:mag2], "run:drift"}
-    assert ok("run all drift") == {:tell, :all, "run:drift"}
+    assert ok("run mag2 drift") == {:tell, [:mag2], {:run, "drift"}}
+    assert ok("run all drift") == {:tell, :all, {:run, "drift"}}
     assert error("run mag2 dirft") =~ "expected drift; did you mean drift?"
     assert error("run drift") == "run needs a name and a behaviour: run mag1 drift"
     assert error("start drift") =~ "drift is a behaviour: run:drift"

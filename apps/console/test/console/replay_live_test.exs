@@ -205,7 +205,7 @@ defmodule Console.ReplayLiveTest do
     options = Runs.options("--robots 3 --speed max --duration 20", ["--record", path])
 
     play = fn _options, setup, recorder ->
-      {:ok, live} = Live.Trial.start_recorded(setup, Live.Pace.new(:max), recorder)
+      {:ok, live} = Live.Trial.start_recorded(setup, Console.Pace.new(:max), recorder)
       reached(live, 5_000)
       {:ok, _done} = Live.Trial.command(live, {:kill, :min1})
       {:ok, _done} = Live.Trial.command(live, {:formation, {:line, 1.5}})

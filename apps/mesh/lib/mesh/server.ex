@@ -12,7 +12,8 @@ defmodule Mesh.Server do
   alias Hal.Event
   alias Mesh.{Backoff, Fault, Interface, Nonblocking, Options, Secret, Sockets, Table}
   alias Mesh.Protocol.{NodeTable, Packet, Roster, WireTerm}
-  alias Mesh.Distribution.{Dialer, Epmd}
+  alias Mesh.Distribution.Epmd
+  alias Mesh.Dialer
 
   @tick_ms 200
   @rejoin_every 50

@@ -4,7 +4,7 @@ defmodule Mesh.Supervisor do
 
       Mesh.Supervisor (rest_for_one)
       |-- Mesh.Server                    signed datagrams: beacons, heartbeats, rounds, rows, stops
-      |-- Mesh.Distribution.Dialer       connects the distribution, again and again
+      |-- Mesh.Dialer       connects the distribution, again and again
       |-- Mesh.CommandRelay              commands to nodes that this one is not connected to
       `-- Mesh.Distribution.Libcluster   where its topologies are configured
 
@@ -13,7 +13,8 @@ defmodule Mesh.Supervisor do
   """
   use Supervisor
   alias Mesh.{CommandRelay, Options}
-  alias Mesh.Distribution.{Dialer, Libcluster}
+  alias Mesh.Distribution.Libcluster
+  alias Mesh.Dialer
 
   @doc """
   Starts the mesh of this node, with options from `Mesh.Options.prepare/1` and the module that

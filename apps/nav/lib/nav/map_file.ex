@@ -8,7 +8,7 @@ defmodule Nav.MapFile do
   larger than a robot can search for a way ten times a second.
   """
   alias Nav.Grid
-  alias Nav.MapFile.{Bmp, Description, Pgm, Picture, Png, Turn, Writer}
+  alias Nav.MapFile.{Description, Ffmpeg, Pgm, Picture, Turn, Writer}
 
   # A picture of 4000 x 4000 pixels, which some mappers always write, is read within seconds.
   @most_pixels 16_000_000
@@ -78,7 +78,7 @@ defmodule Nav.MapFile do
           {:ok, Picture.t()} | {:error, line :: String.t()}
   def picture(file, most_pixels, transparent \\ 255) do
     with {:ok, bytes} <- read(file, @most_bytes),
-         {:ok, picture} <- decode(bytes, most_pixels, transparent) do
+         {:ok, picture} <- decode(file, bytes, most_pixels, transparent) do
       {:ok, picture}
     else
       {:error, reason} -> {:error, "#{file}: #{reason}"}
@@ -102,15 +102,24 @@ defmodule Nav.MapFile do
     end
   end
 
-  defp decode(<<0x89, "PNG\r\n", 0x1A, "\n", chunks::binary>>, most, transparent),
-    do: Png.decode(chunks, most, transparent)
-
-  defp decode(<<"P", kind, rest::binary>>, most, _transparent) when kind in [?2, ?5],
+  defp decode(_file, <<"P", kind, rest::binary>>, most, _transparent) when kind in [?2, ?5],
     do: Pgm.decode(kind, rest, most)
 
-  defp decode(<<"BM", rest::binary>>, most, _transparent), do: Bmp.decode(rest, most)
+  defp decode(file, bytes, most, transparent) do
+    case Ffmpeg.head(bytes) do
+      {kind, {width, height} = size} ->
+        with :ok <- Picture.size(width, height, most),
+             do: Ffmpeg.decode(file, kind, size, transparent)
 
-  defp decode(bytes, _most, _transparent) do
+      :error ->
+        {:error, "the picture is damaged"}
+
+      nil ->
+        unknown(bytes)
+    end
+  end
+
+  defp unknown(bytes) do
     what = if kind = kind(bytes), do: "is #{kind}", else: "is no picture that is known"
     {:error, "#{what}: PNG, PGM (P2, P5) and BMP are read; save it as PNG"}
   end

@@ -74,7 +74,6 @@ defmodule Robot.Command do
     {"acknowledge", [], []}
   ]
 
-  @bare [:stop, :lead, :start, :wander, :rest, :ping, :arm, :disarm, :acknowledge]
   @keywords Enum.map(@grammar, &elem(&1, 0))
   # No valid command is longer.
   @longest 500
@@ -210,35 +209,4 @@ defmodule Robot.Command do
   @spec name(t()) :: atom()
   def name(command) when is_atom(command), do: command
   def name(command), do: elem(command, 0)
-
-  @doc """
-  The text of a command; `parse/2` turns it into the command again.
-
-      iex> Robot.Command.to_text({:goto, 2.0, 1.0, nil})
-      "goto:2.0:1.0"
-      iex> Robot.Command.to_text({:blob, Hal.Pose.new(1, 2), 0.01, true})
-      "blob:1.0:2.0:0.0:0.01:1"
-  """
-  @spec to_text(t()) :: String.t()
-  def to_text(word) when word in @bare, do: Atom.to_string(word)
-  def to_text({:start, mission}), do: join("start", [mission])
-  def to_text({:run, behaviour}), do: join("run", [behaviour])
-  def to_text({:square, nil}), do: "square"
-  def to_text({:square, side}), do: join("square", [side])
-  def to_text({:move, v, w}), do: join("move", [v, w])
-  def to_text({:move, v, w, for_s}), do: join("move", [v, w, for_s])
-  def to_text({:goto, x, y, nil}), do: join("goto", [x, y])
-  def to_text({:goto, x, y, theta}), do: join("goto", [x, y, theta])
-  def to_text({:follow_the_leader, id}), do: join("followtheleader", [id])
-  def to_text({:find_blob, nil}), do: "findblob"
-  def to_text({:find_blob, colour}), do: join("findblob", [colour])
-  def to_text({:subscribe, id}), do: join("subscribe", [id])
-  def to_text({:unsubscribe, id}), do: join("unsubscribe", [id])
-  def to_text({:position, %Pose{} = p}), do: join("position", [p.x, p.y, p.heading])
-  def to_text({:follow, %Pose{} = p}), do: join("follow", [p.x, p.y, p.heading])
-
-  def to_text({:blob, %Pose{} = p, size, found?}),
-    do: join("blob", [p.x, p.y, p.heading, size, if(found?, do: 1, else: 0)])
-
-  defp join(keyword, arguments), do: Enum.join([keyword | arguments], ":")
 end

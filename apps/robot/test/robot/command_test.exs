@@ -82,33 +82,6 @@ defmodule Robot.CommandTest do
     end
   end
 
-  test "what is written is read again" do
-    for _ <- 1..500 do
-      n = fn -> (:rand.uniform() - 0.5) * :math.pow(10, :rand.uniform(10) - 5) end
-      pose = Pose.new(n.(), n.(), n.())
-
-      command =
-        Enum.random([
-          :stop,
-          :wander,
-          {:square, n.()},
-          {:start, "patrol:loop=square,period=90"},
-          {:run, "corners:side=2,at={1:2}"},
-          {:move, n.(), n.()},
-          {:goto, n.(), n.(), nil},
-          {:goto, n.(), n.(), n.()},
-          {:follow_the_leader, Enum.random(@known)},
-          {:find_blob, "Red"},
-          {:subscribe, :mag1},
-          {:position, pose},
-          {:follow, pose},
-          {:blob, pose, abs(n.()), true}
-        ])
-
-      assert {:ok, command} == Command.parse(Command.to_text(command), @known)
-    end
-  end
-
   test "rubbish neither crashes nor makes atoms" do
     Command.parse("goto:1:2", @known)
 

@@ -7,7 +7,7 @@ defmodule Sim.Compute do
   alias Sim.Compute
   alias Sim.Compute.Reference
   alias Sim.Compute.Palette
-  alias Sim.World.CameraFrustum
+  alias Sim.Compute.CameraFrustum
 
   @typedoc "What noise is drawn for; `nil` for none."
   @type noise :: {seed :: integer(), step :: integer(), robot :: non_neg_integer()} | nil

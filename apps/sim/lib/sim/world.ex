@@ -14,7 +14,8 @@ defmodule Sim.World do
   """
   alias Hal.{Options, Pose, Twist}
   alias Sim.{Compute, Floorplan, World}
-  alias Sim.World.{Body, CameraFrustum}
+  alias Sim.World.Body
+  alias Sim.Compute.CameraFrustum
   alias Sim.World.{Bodies, Motion, Touch}
 
   @landmark_height 1.0

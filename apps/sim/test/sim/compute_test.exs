@@ -2,7 +2,7 @@ defmodule Sim.ComputeTest do
   use ExUnit.Case, async: true
   alias Sim.Compute
   alias Sim.Compute.{Rays, Reference}
-  alias Sim.World.CameraFrustum
+  alias Sim.Compute.CameraFrustum
 
   # A plan of 10 to 60 cells a side with a few walls in it, and things to look at.
   defp plan do

@@ -8,7 +8,7 @@ defmodule Swarm.MeshNodes.Junk do
 
   @names [
     Mesh.CommandRelay,
-    Mesh.Distribution.Dialer,
+    Mesh.Dialer,
     Mesh.Server,
     Swarm.EStop.Broadcaster,
     Swarm.Discovery.Presence,

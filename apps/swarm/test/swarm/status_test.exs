@@ -262,7 +262,7 @@ defmodule Swarm.StatusTest do
     assert %Status{view: {number, members}} = status
     assert number >= 1 and :st1 in members and :st2 in members
     assert inspect(status) =~ "view #{number}, hears #{length(status.hears)}"
-    assert Swarm.Membership.Matrix.hears?(Swarm.matrix(), :st1, :st2)
+    assert Swarm.Status.Matrix.hears?(Swarm.matrix(), :st1, :st2)
   end
 
   test "the line says why a device is offline, and that a robot without sonar is slow" do

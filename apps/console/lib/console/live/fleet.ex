@@ -5,8 +5,7 @@ defmodule Console.Live.Fleet do
   """
   @behaviour Console.Live
   alias Console.Cli.Format
-  alias Console.Page.About
-  alias Robot.Command
+  alias Console.About
   alias Lab.Fleet
 
   @doc "Starts a fleet; the error says in one line what is wrong with its options."
@@ -70,8 +69,8 @@ defmodule Console.Live.Fleet do
   defp carry_out({:landmark, :none}, live), do: Fleet.move_landmark(live, nil)
   defp carry_out({:landmark, place}, live), do: Fleet.move_landmark(live, place)
 
-  defp carry_out({:tell, target, text}, live) do
-    with :ok <- on_floor(text, Fleet.scene(live).map), do: Swarm.tell(target, text)
+  defp carry_out({:tell, target, command}, live) do
+    with :ok <- on_floor(command, Fleet.scene(live).map), do: Swarm.tell(target, command)
   end
 
   defp carry_out(:estop, _live), do: Swarm.estop()
@@ -89,14 +88,15 @@ defmodule Console.Live.Fleet do
   end
 
   # Robots have no map, so only here can one see that a place is in a wall.
-  defp on_floor(text, map) do
-    with {:ok, {:goto, x, y, _heading}} <- Command.parse(text, []),
-         true <- Sim.Floorplan.wall?(map, {x, y}) do
+  defp on_floor({:goto, x, y, _heading}, map) do
+    if Sim.Floorplan.wall?(map, {x, y}) do
       {width, height} = Sim.Floorplan.size(map)
       size = "#{Format.decimals(width, 1)} x #{Format.decimals(height, 1)} m"
       {:error, "no robot can stand at #{x},#{y}: map #{map.name} is #{size}, and that is a wall"}
     else
-      _floor_or_no_place -> :ok
+      :ok
     end
   end
+
+  defp on_floor(_no_place, _map), do: :ok
 end

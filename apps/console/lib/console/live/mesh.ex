@@ -8,7 +8,7 @@ defmodule Console.Live.Mesh do
   """
   use GenServer
   alias Console.Live.Mesh.{Notice, View}
-  alias Console.Page.About
+  alias Console.About
   alias Hal.Ticker
   alias Swarm.Status
   @behaviour Console.Live
@@ -66,7 +66,7 @@ defmodule Console.Live.Mesh do
     end
   end
 
-  defp carry_out({:tell, target, text}), do: Swarm.tell(target, text)
+  defp carry_out({:tell, target, command}), do: Swarm.tell(target, command)
   defp carry_out({:formation, {kind, nil}}), do: Swarm.formation(kind)
   defp carry_out({:formation, {kind, spacing}}), do: Swarm.formation(kind, spacing: spacing)
   defp carry_out(:estop), do: Swarm.estop()

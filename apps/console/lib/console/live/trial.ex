@@ -1,6 +1,6 @@
 defmodule Console.Live.Trial do
   @moduledoc """
-  Runs a trial that a person watches: the lockstep run, at the pace that the person wants (`Console.Live.Pace`), at
+  Runs a trial that a person watches: the lockstep run, at the pace that the person wants (`Console.Pace`), at
   first one step of 100 ms each 100 ms.
 
   It never runs faster to make up for lost time: on a machine too slow for its fleet the run is
@@ -9,10 +9,9 @@ defmodule Console.Live.Trial do
   """
   use GenServer
   alias Console.Cli.Format
-  alias Console.Live.Pace
-  alias Console.Page.About
+  alias Console.Pace
+  alias Console.About
   alias Console.Prompt
-  alias Robot.Command
   alias Lab.{Recorder, Trial}
   alias Swarm.Commands
   alias Swarm.Missions.Text
@@ -195,15 +194,12 @@ defmodule Console.Live.Trial do
     tell(:all, {:estop, {:demo, 0, at_ms}}, state)
   end
 
-  defp carry_out({:tell, _target, "replace" <> _mission}, _state),
+  defp carry_out({:tell, _target, {:replace, _mission}}, _state),
     do: {:error, "in lockstep no mission is replaced; start:MISSION starts another one"}
 
-  defp carry_out({:tell, target, text}, %{module: module, trial: trial} = state) do
-    robots = module.living(trial)
-
-    with {:ok, command} <- Command.parse(text, robots),
-         :ok <- possible(command),
-         {:ok, request} <- Text.request(command, length(robots)),
+  defp carry_out({:tell, target, command}, %{module: module, trial: trial} = state) do
+    with :ok <- possible(command),
+         {:ok, request} <- Text.request(command, length(module.living(trial))),
          do: tell(target, request, state)
   end
 

@@ -2,7 +2,8 @@ defmodule Console.Page.Client do
   @moduledoc false
   # Tells the page of the robot that a person looks at there, five times a second.
   use GenServer
-  alias Console.Page.{About, Feed}
+  alias Console.Page.Feed
+  alias Console.About
 
   @about_ms 200
 

@@ -5,7 +5,8 @@ defmodule Console.Page.Request do
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_socket, :mochiweb_websocket]}
   alias Console.Page
-  alias Console.Page.{About, Client, Door, Feed, Line, State}
+  alias Console.Page.{Client, Door, Feed, Line, State}
+  alias Console.About
   alias Console.{Orders, Prompt}
 
   @folder Path.expand("../../../priv/page", __DIR__)

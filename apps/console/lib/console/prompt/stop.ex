@@ -20,14 +20,14 @@ defmodule Console.Prompt.Stop do
       List.duplicate({:ok, :estop}, 8)
       iex> for line <- ["stop all", "stop!", "stpo", "all stop!", "stop mag1", "mag1 stop", "disarm now"],
       ...>     do: elem(Console.Prompt.Stop.read(line, ["reset", "step", "mag1"], [:mag1]), 1)
-      [{:tell, :all, "stop"}, {:tell, :all, "stop"}, {:tell, :all, "stop"}, {:tell, :all, "stop"},
-       {:tell, [:mag1], "stop"}, {:tell, [:mag1], "stop"}, {:tell, :all, "disarm"}]
+      [{:tell, :all, :stop}, {:tell, :all, :stop}, {:tell, :all, :stop}, {:tell, :all, :stop},
+       {:tell, [:mag1], :stop}, {:tell, [:mag1], :stop}, {:tell, :all, :disarm}]
       iex> for line <- ["step", "start mag1", "stop mag9", "reset"],
       ...>     do: Console.Prompt.Stop.read(line, ["reset", "step", "start", "mag1"], [:mag1])
       List.duplicate(:other, 4)
   """
   @spec read(String.t(), words :: [String.t()], robots :: [atom()]) ::
-          {:ok, :estop | {:tell, :all | [atom()], String.t()}} | :other
+          {:ok, :estop | {:tell, :all | [atom()], :stop | :disarm}} | :other
   def read(line, words, robots) do
     case line |> String.downcase() |> String.split(~r/[^\p{L}\p{N}_]+/u, trim: true) do
       [] -> :other
@@ -61,12 +61,16 @@ defmodule Console.Prompt.Stop do
   defp kind(first, words) do
     case Suggest.nearest(first, @emergency ++ @first ++ (words -- @emergency)) do
       near when near in @emergency -> :estop
-      near when near in @first -> near
+      "stop" -> :stop
+      "disarm" -> :disarm
       _other -> :other
     end
   end
 
-  defp stop(word, rest, robots) when is_binary(word) do
+  defp stop(:estop, _rest, _robots), do: {:ok, :estop}
+  defp stop(:other, _rest, _robots), do: :other
+
+  defp stop(word, rest, robots) do
     names = Enum.reject(rest, &(&1 in @filler))
 
     cond do
@@ -80,7 +84,4 @@ defmodule Console.Prompt.Stop do
         :other
     end
   end
-
-  defp stop(:estop, _rest, _robots), do: {:ok, :estop}
-  defp stop(:other, _rest, _robots), do: :other
 end

@@ -110,7 +110,7 @@ defmodule Mix.Tasks.Demo do
           options,
           &Session.run(&1, Live.Fleet, fn trial -> Live.Fleet.start_link(trial) end)
         ),
-      else: lockstep(options, Live.Pace.new(options.speed || 1.0))
+      else: lockstep(options, Console.Pace.new(options.speed || 1.0))
   end
 
   defp few?(robots), do: length(robots) <= @robots_a_processor * System.schedulers_online()

@@ -1,7 +1,6 @@
 defmodule Nav.MapFile.PngTest do
   use ExUnit.Case, async: true
   alias Nav.MapFile
-  doctest MapFile.Adam7
   doctest MapFile.Pgm
   @moduletag :tmp_dir
 

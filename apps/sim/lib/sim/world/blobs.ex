@@ -4,7 +4,7 @@ defmodule Sim.World.Blobs do
   # fleets; tests compare it with painting. Pure.
   alias Sim.{Compute, Noise}
   alias Sim.Compute.Palette
-  alias Sim.World.CameraFrustum
+  alias Sim.Compute.CameraFrustum
   alias Vision.Blob
 
   @least_area 20

@@ -61,7 +61,7 @@ defmodule Swarm.Blackboard.MeshTest do
              matrix = Cluster.call(one, Swarm, :matrix, [])
 
              Enum.all?(names, fn a ->
-               Enum.all?(names -- [a], &(Swarm.Membership.Matrix.hears?(matrix, a, &1) == true))
+               Enum.all?(names -- [a], &(Swarm.Status.Matrix.hears?(matrix, a, &1) == true))
              end)
            end)
 

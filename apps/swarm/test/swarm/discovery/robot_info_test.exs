@@ -7,7 +7,7 @@ defmodule Swarm.Discovery.RobotInfoTest do
   alias Swarm.Discovery.Presence
 
   doctest Swarm.Discovery.RobotInfo
-  doctest Swarm.Membership.Matrix
+  doctest Swarm.Status.Matrix
   doctest Swarm.Discovery.Search
 
   # A row as another node would send it.

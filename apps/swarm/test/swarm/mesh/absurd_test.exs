@@ -8,7 +8,7 @@ defmodule Swarm.Mesh.AbsurdTest do
 
   @parts [
     Mesh.Server,
-    Mesh.Distribution.Dialer,
+    Mesh.Dialer,
     Swarm.EStop.Broadcaster,
     Swarm.Blackboard,
     Swarm.Discovery.Presence

@@ -12,7 +12,7 @@ defmodule Swarm.Mesh.CrashesTest do
     Swarm.EStop.Broadcaster,
     Swarm.Directory,
     Mesh.CommandRelay,
-    Mesh.Distribution.Dialer,
+    Mesh.Dialer,
     Mesh.Server
   ]
   @times 5

@@ -1,4 +1,4 @@
-defmodule Sim.World.CameraFrustum do
+defmodule Sim.Compute.CameraFrustum do
   @moduledoc false
   # Places a robot's camera, and tells what its picture can contain. Pure.
   #
@@ -25,9 +25,9 @@ defmodule Sim.World.CameraFrustum do
   @type pole ::
           {float(), float(), radius :: float(), height :: float(), Sim.Compute.Palette.kind()}
 
-  @doc "The camera of a body, with pictures of the profile's size."
+  @doc "The camera of a body of a world, with pictures of the profile's size."
   @spec of(Sim.World.Body.t()) :: t()
-  def of(%Sim.World.Body{pose: pose, profile: %{camera: camera}} = body) do
+  def of(%{pose: pose, profile: %{camera: camera}} = body) do
     {c, s} = Trig.cos_sin(pose.heading + body.pan)
     focal = camera.width / 2 / Trig.tan(body.field_of_view / 2)
 

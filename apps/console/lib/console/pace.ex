@@ -1,4 +1,4 @@
-defmodule Console.Live.Pace do
+defmodule Console.Pace do
   @moduledoc """
   Describes how fast a run in lockstep goes, as a person wants it: at a multiple of real time, as fast as it
   goes, paused, or a few steps at a time. Pure; the time is an input, in ms.
@@ -39,9 +39,9 @@ defmodule Console.Live.Pace do
   @doc """
   A speed from a text; the error says what is allowed.
 
-      iex> Console.Live.Pace.speed("2.5")
+      iex> Console.Pace.speed("2.5")
       {:ok, 2.5}
-      iex> Console.Live.Pace.speed("0")
+      iex> Console.Pace.speed("0")
       {:error, "a number from 0.1 to 100, or max,"}
   """
   @spec speed(String.t()) :: {:ok, speed()} | {:error, String.t()}
@@ -55,7 +55,7 @@ defmodule Console.Live.Pace do
   @doc """
   A number of steps from a text; the error says what is allowed.
 
-      iex> Console.Live.Pace.steps("10")
+      iex> Console.Pace.steps("10")
       {:ok, 10}
   """
   @spec steps(String.t()) :: {:ok, pos_integer()} | {:error, String.t()}
@@ -64,8 +64,8 @@ defmodule Console.Live.Pace do
   @doc """
   Carries out a command. Steps are for a paused run.
 
-      iex> {:ok, pace} = Console.Live.Pace.command(Console.Live.Pace.new(), :pause)
-      iex> {Console.Live.Pace.wait_ms(pace), Console.Live.Pace.command(pace, :pause)}
+      iex> {:ok, pace} = Console.Pace.command(Console.Pace.new(), :pause)
+      iex> {Console.Pace.wait_ms(pace), Console.Pace.command(pace, :pause)}
       {:never, {:error, "it is paused already"}}
   """
   @spec command(t(), command()) :: {:ok, t()} | {:error, String.t()}
@@ -83,7 +83,7 @@ defmodule Console.Live.Pace do
   @doc """
   How long after the last step the next one is due, in ms; `:never` for a run that is paused.
 
-      iex> Enum.map([1.0, 0.1, 3.0, :max], &Console.Live.Pace.wait_ms(Console.Live.Pace.new(&1)))
+      iex> Enum.map([1.0, 0.1, 3.0, :max], &Console.Pace.wait_ms(Console.Pace.new(&1)))
       [100, 1000, 33, 0]
   """
   @spec wait_ms(t()) :: non_neg_integer() | :never
@@ -114,10 +114,10 @@ defmodule Console.Live.Pace do
   @doc """
   In words, for people: what is asked for, and what was reached.
 
-      iex> pace = Enum.reduce(0..10, Console.Live.Pace.new(2.0), &Console.Live.Pace.stepped(&2, &1 * 70))
-      iex> Console.Live.Pace.words(pace)
+      iex> pace = Enum.reduce(0..10, Console.Pace.new(2.0), &Console.Pace.stepped(&2, &1 * 70))
+      iex> Console.Pace.words(pace)
       "2.0x asked, 1.4x reached"
-      iex> Console.Live.Pace.words(%{pace | left: 0})
+      iex> Console.Pace.words(%{pace | left: 0})
       "paused, then 2.0x"
   """
   @spec words(t()) :: String.t()

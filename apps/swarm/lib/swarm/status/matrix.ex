@@ -1,9 +1,9 @@
-defmodule Swarm.Membership.Matrix do
+defmodule Swarm.Status.Matrix do
   @moduledoc """
   Shows which robot hears which. In `iex` it prints as a table, with a line for each robot and a column
   for each robot that it may hear:
 
-      #Swarm.Membership.Matrix, 3 robots
+      #Swarm.Status.Matrix, 3 robots
               mag1  mag2  min1  view
         mag1     .     x     -  4: mag1 mag2
         mag2     x     .     x  7: mag1 mag2 min1
@@ -24,8 +24,8 @@ defmodule Swarm.Membership.Matrix do
   The matrix of robots of this status.
 
       iex> a = %Swarm.Status{robot: :mag1, hears: [:mag2], view: {1, [:mag1, :mag2]}}
-      iex> Swarm.Membership.Matrix.new([a, %Swarm.Status{robot: :mag2, state: :no_answer}]) |> inspect()
-      "#Swarm.Membership.Matrix, 2 robots\\n        mag1  mag2  view\\n  mag1     .     x  1: mag1 mag2\\n  mag2     ?     .  "
+      iex> Swarm.Status.Matrix.new([a, %Swarm.Status{robot: :mag2, state: :no_answer}]) |> inspect()
+      "#Swarm.Status.Matrix, 2 robots\\n        mag1  mag2  view\\n  mag1     .     x  1: mag1 mag2\\n  mag2     ?     .  "
   """
   @spec new([Status.t()]) :: t()
   def new(status) do
@@ -62,13 +62,13 @@ defmodule Swarm.Membership.Matrix do
             String.pad_trailing("#{from}", wide) <> marks <> "  " <> view(matrix.lines[from])
         end
 
-      Enum.join(["#Swarm.Membership.Matrix, #{length(robots)} robots", head | lines], "\n")
+      Enum.join(["#Swarm.Status.Matrix, #{length(robots)} robots", head | lines], "\n")
     end
 
     defp mark(_matrix, one, one), do: "."
 
     defp mark(matrix, from, to) do
-      case Swarm.Membership.Matrix.hears?(matrix, from, to) do
+      case Swarm.Status.Matrix.hears?(matrix, from, to) do
         true -> "x"
         false -> "-"
         :unknown -> "?"

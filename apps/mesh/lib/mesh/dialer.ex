@@ -1,4 +1,4 @@
-defmodule Mesh.Distribution.Dialer do
+defmodule Mesh.Dialer do
   @moduledoc """
   Connects this node's distribution to the nodes that the topology names, and retries for ever,
   with back-off. A connection attempt blocks for seconds if packets get lost, so each has a

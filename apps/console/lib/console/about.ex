@@ -1,4 +1,4 @@
-defmodule Console.Page.About do
+defmodule Console.About do
   @moduledoc false
   # Describes what a robot knows and does, for the page: the wishes, what limits it, its way, its devices, what its
   # sonars and its camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
