@@ -63,45 +63,48 @@ defmodule Swarm.Status do
 
   @recently_ms 60_000
 
+  # One line a field, in the order in which the status line has them: its default, and how a row of the blackboard has it
+  # (`Swarm.Status.Row`), `nil` for not at all. `read/2` takes it from the robot's board, `Swarm.Status.Words.of/2` puts it in words.
+  @fields [
+    from: {:robot, nil},
+    node: {nil, :name},
+    state: {:idle, :name},
+    by: {nil, :word},
+    weights: {[], nil},
+    way: {[], nil},
+    pose: {nil, :pose},
+    uncertainty: {nil, {:maybe, :metres}},
+    frame: {nil, {:maybe, :frame}},
+    speed: {0.0, :thousandths},
+    power: {nil, :number},
+    epoch: {nil, {:maybe, :count}},
+    peers: {%{}, nil},
+    estop: {false, :boolean},
+    estop_by: {[], nil},
+    estop_file: {nil, {:maybe, {:text, 80}}},
+    arming: {nil, {:maybe, :arming}},
+    why: {nil, nil},
+    fault: {nil, {:maybe, {:text, 500}}},
+    limits: {[], :words},
+    hung: {nil, {:maybe, :hung}},
+    crashed: {nil, {:maybe, {:text, 240}}},
+    blocked_by: {nil, {:maybe, {:text, 80}}},
+    says: {nil, {:maybe, {:text, 80}}},
+    replaced: {nil, nil},
+    leader: {nil, :word},
+    view: {nil, :view},
+    hears: {[], nil},
+    network: {nil, nil},
+    rejected: {%{}, :sum},
+    age_ms: {nil, :age},
+    head: {nil, {:maybe, :head}},
+    sees: {nil, {:maybe, :sight}},
+    health: {%{}, :offline},
+    offline: {%{}, nil}
+  ]
+
   @enforce_keys [:robot]
-  defstruct @enforce_keys ++
-              [
-                from: :robot,
-                node: nil,
-                state: :idle,
-                by: nil,
-                weights: [],
-                way: [],
-                pose: nil,
-                uncertainty: nil,
-                frame: nil,
-                speed: 0.0,
-                limits: [],
-                estop: false,
-                estop_by: [],
-                estop_file: nil,
-                arming: nil,
-                why: nil,
-                hung: nil,
-                crashed: nil,
-                leader: nil,
-                epoch: nil,
-                blocked_by: nil,
-                says: nil,
-                power: nil,
-                health: %{},
-                offline: %{},
-                fault: nil,
-                replaced: nil,
-                peers: %{},
-                hears: [],
-                view: nil,
-                rejected: %{},
-                network: nil,
-                head: nil,
-                sees: nil,
-                age_ms: nil
-              ]
+  defstruct @enforce_keys ++ for({name, {default, _sent}} <- @fields, do: {name, default})
 
   @type view :: {number :: non_neg_integer(), members :: [atom()]}
   @type t :: %__MODULE__{
@@ -143,61 +146,76 @@ defmodule Swarm.Status do
           age_ms: non_neg_integer() | nil
         }
 
+  @doc "The fields that rows have, each with how it is sent (`Swarm.Status.Row`)."
+  @spec sent() :: [{atom(), sent :: term()}]
+  def sent, do: for({name, {_default, sent}} when sent != nil <- @fields, do: {name, sent})
+
   @doc "The status of a robot of this node, from its board and its receiver."
   @spec of(Robot.Config.t(), Board.t(), Receiver.t()) :: t()
   def of(config, board, receiver) do
-    entries = Board.entries(board)
-    driving = value(entries, :driving)
-    mission = value(entries, :mission)
-    now_ms = Robot.Config.now(config)
-    health = for {{:health, device}, {condition, _age}} <- entries, do: {device, condition}
-
-    %__MODULE__{
-      robot: config.id,
-      node: node(),
-      state: state(mission),
-      by: entries |> value(:doing) |> field(:by),
-      weights: entries |> value(:doing) |> field(:weights) || [],
-      way: entries |> value(:doing) |> field(:way) || [],
-      fault: entries |> value(:doing) |> field(:fault),
-      replaced: entries |> value(:replaced) |> field(:says),
-      pose: value(entries, :pose),
-      uncertainty: entries |> value(:uncertainty) |> field(:radius),
-      frame: Frame.of(config, value(entries, :uncertainty)),
-      speed: entries |> value(:odometry) |> linear(),
-      limits:
-        (entries |> value(:doing) |> field(:limits) || []) ++ (field(driving, :limits) || []),
-      estop: Board.latched?(board),
-      estop_by: entries |> value(:estop) |> callers(),
-      estop_file: unsaved(Board.unsaved(board)),
-      arming: entries |> value(:arming) |> field(:state),
-      why: entries |> value(:arming) |> field(:why),
-      hung: hung(entries),
-      crashed: crashed(entries),
-      leader: mission |> field(:claim) |> field(:leader),
-      epoch: mission |> field(:claim) |> field(:epoch),
-      blocked_by: mission |> field(:claim) |> field(:blocked_by),
-      says: mission |> field(:claim) |> field(:says),
-      power: value(entries, :power),
-      health: Map.new(health),
-      offline:
-        for(
-          {device, {:offline, reason}} <- health,
-          into: %{},
-          do: {device, words(config, device, reason)}
-        ),
-      peers:
-        Map.new(receiver.peers.rows, fn {id, _} ->
-          {id, Peers.status(receiver.peers, id, now_ms)}
-        end),
-      hears: Peers.heard(receiver.peers, now_ms),
-      view: {Peers.view_number(receiver.peers, now_ms), Peers.view(receiver.peers, now_ms)},
-      rejected: receiver.rejected,
-      network: Mesh.fault(),
-      head: Sight.head(entries),
-      sees: Sight.of(config, entries),
-      age_ms: age(entries)
+    seen = %{
+      config: config,
+      board: board,
+      receiver: receiver,
+      now_ms: Robot.Config.now(config),
+      entries: Board.entries(board)
     }
+
+    fields = for {name, _about} <- @fields, do: {name, read(name, seen)}
+    struct!(__MODULE__, [{:robot, config.id} | fields])
+  end
+
+  defp read(:from, _seen), do: :robot
+  defp read(:node, _seen), do: node()
+  defp read(:network, _seen), do: Mesh.fault()
+  defp read(:state, %{entries: entries}), do: entries |> value(:mission) |> state()
+
+  defp read(:limits, %{entries: entries}),
+    do: (entry(entries, :doing, :limits) || []) ++ (entry(entries, :driving, :limits) || [])
+
+  defp read(name, %{entries: entries}) when name in [:weights, :way],
+    do: entry(entries, :doing, name) || []
+
+  defp read(name, %{entries: entries}) when name in [:by, :fault],
+    do: entry(entries, :doing, name)
+
+  defp read(name, %{entries: entries}) when name in [:pose, :power], do: value(entries, name)
+
+  defp read(name, %{entries: entries}) when name in [:leader, :epoch, :blocked_by, :says],
+    do: entries |> entry(:mission, :claim) |> field(name)
+
+  defp read(:replaced, %{entries: entries}), do: entry(entries, :replaced, :says)
+  defp read(:uncertainty, %{entries: entries}), do: entry(entries, :uncertainty, :radius)
+  defp read(:arming, %{entries: entries}), do: entry(entries, :arming, :state)
+  defp read(:why, %{entries: entries}), do: entry(entries, :arming, :why)
+  defp read(:speed, %{entries: entries}), do: entries |> value(:odometry) |> linear()
+  defp read(:estop, %{board: board}), do: Board.latched?(board)
+  defp read(:estop_by, %{entries: entries}), do: entries |> value(:estop) |> callers()
+  defp read(:estop_file, %{board: board}), do: unsaved(Board.unsaved(board))
+  defp read(:hung, %{entries: entries}), do: hung(entries)
+  defp read(:crashed, %{entries: entries}), do: crashed(entries)
+  defp read(:head, %{entries: entries}), do: Sight.head(entries)
+  defp read(:age_ms, %{entries: entries}), do: age(entries)
+  defp read(:sees, seen), do: Sight.of(seen.config, seen.entries)
+  defp read(:frame, seen), do: Frame.of(seen.config, value(seen.entries, :uncertainty))
+  defp read(:rejected, %{receiver: receiver}), do: receiver.rejected
+
+  defp read(:hears, %{receiver: receiver, now_ms: now_ms}),
+    do: Peers.heard(receiver.peers, now_ms)
+
+  defp read(:view, %{receiver: %{peers: peers}, now_ms: now_ms}),
+    do: {Peers.view_number(peers, now_ms), Peers.view(peers, now_ms)}
+
+  defp read(:peers, %{receiver: %{peers: peers}, now_ms: now_ms}),
+    do: Map.new(peers.rows, fn {id, _} -> {id, Peers.status(peers, id, now_ms)} end)
+
+  defp read(:health, %{entries: entries}),
+    do: for({{:health, device}, {health, _age}} <- entries, into: %{}, do: {device, health})
+
+  defp read(:offline, %{config: config} = seen) do
+    for {device, {:offline, reason}} <- read(:health, seen),
+        into: %{},
+        do: {device, config |> Map.fetch!(device) |> Words.offline(reason)}
   end
 
   defp callers(nil), do: []
@@ -205,9 +223,6 @@ defmodule Swarm.Status do
 
   defp unsaved(nil), do: nil
   defp unsaved({file, reason}), do: "#{:file.format_error(reason)}: #{file}"
-
-  defp words(config, device, reason),
-    do: config |> Map.fetch!(device) |> Words.offline(reason)
 
   @doc """
   Why its wheels may not turn, as text for people; `nil` if they may, or if that is unknown.
@@ -242,6 +257,7 @@ defmodule Swarm.Status do
     with {_age_ms, line} <- Enum.min(crashed, fn -> nil end), do: line
   end
 
+  defp entry(entries, key, field), do: entries |> value(key) |> field(field)
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)
 
@@ -255,12 +271,13 @@ defmodule Swarm.Status do
   defp age(%{odometry: {_value, age_ms}}), do: age_ms
   defp age(_no_wheels), do: nil
 
-  defimpl Inspect do
-    # At most so many robots that it does not hear are named.
-    @named 3
+  @doc "The fields in the order of the line."
+  @spec fields() :: [atom()]
+  def fields, do: Keyword.keys(@fields)
 
+  defimpl Inspect do
     def inspect(status, _options) do
-      [first | rest] = [speed(status) | remarks(status)]
+      [first | rest] = [speed(status) | Swarm.Status.Words.all(status)]
       words = ["#{status.robot} #{status.state} #{place(status)} #{first}" | rest]
       "#" <> Enum.join(words, ", ")
     end
@@ -271,77 +288,13 @@ defmodule Swarm.Status do
       degrees = round(heading * 180 / :math.pi())
 
       "(#{fixed(x)}, #{fixed(y)}, #{degrees} deg)" <>
-        if(metres, do: " #{within(metres)},", else: "")
+        if(metres, do: " ±#{fixed(metres)} m,", else: "")
     end
-
-    defp within(metres), do: "±#{fixed(metres)} m"
 
     defp speed(%{speed: nil}), do: "speed unknown"
 
     defp speed(status),
       do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
-
-    defp remarks(status) do
-      offline = for {device, {:offline, _}} <- status.health, do: offline(status, device)
-      dropped = status.rejected |> Map.values() |> Enum.sum()
-
-      [
-        status.estop && "E-STOP" <> by(status.estop_by),
-        unsaved(status),
-        Swarm.Status.arming(status),
-        status.fault && "FAULT (#{status.fault})",
-        limited?(status, "blind") && "BLIND (no sonar; slow)",
-        limited?(status, "caution") && "CAUTIOUS (another robot may be near; slow)",
-        hung(status.hung),
-        status.crashed && "CRASHED #{status.crashed}",
-        status.blocked_by && "BLOCKED by #{status.blocked_by}",
-        is_binary(status.says) && status.says,
-        status.replaced,
-        status.leader && "leader #{status.leader}",
-        status.view && "view #{elem(status.view, 0)}",
-        "hears #{length(status.hears)}" <> deaf(status),
-        status.network && "NO NETWORK (#{status.network})",
-        dropped > 0 && "dropped #{dropped} messages",
-        "age #{status.age_ms || "?"} ms" <> if(status.from == :row, do: " by its row", else: ""),
-        Swarm.Status.Sight.words(status.head),
-        Swarm.Status.Sight.words(status.sees)
-      ]
-      |> Enum.filter(& &1)
-      |> Kernel.++(offline)
-    end
-
-    defp by([]), do: ""
-    defp by(callers), do: " by #{Enum.join(callers, ", ")}"
-
-    defp limited?(status, limit), do: Enum.any?(status.limits, &("#{&1}" == limit))
-
-    defp offline(%{offline: lines}, device) do
-      case lines do
-        %{^device => line} -> "#{device} offline (#{line})"
-        _not_told -> "#{device} offline"
-      end
-    end
-
-    defp unsaved(%{estop_file: nil}), do: nil
-    defp unsaved(%{estop: true} = status), do: "E-STOP NOT ON ITS DISK (#{status.estop_file})"
-    defp unsaved(status), do: "RESET NOT ON ITS DISK (#{status.estop_file})"
-
-    defp hung(nil), do: nil
-    defp hung({:silent, where, _ago_ms}), do: "HANGS in #{where}"
-
-    defp hung({:hung, where, ago_ms}),
-      do: "HUNG in #{where} #{div(ago_ms, 1_000)} s ago, started again"
-
-    # The robots of the view that are known only by way of others; nearly always none.
-    defp deaf(%{view: {_number, members}} = status) do
-      case Enum.split(members -- [status.robot | status.hears], @named) do
-        {[], []} -> ""
-        {names, []} -> " but not #{Enum.join(names, " ")}"
-        {names, more} -> " but not #{Enum.join(names, " ")} and #{length(more)} more"
-      end
-    end
-
-    defp deaf(_unknown), do: ""
 
     defp fixed(number), do: :erlang.float_to_binary(number * 1.0, decimals: 2)
   end

@@ -5,6 +5,7 @@ defmodule Swarm.StatusTest do
 
   doctest Frame
   doctest Swarm.Status.Sight
+  doctest Swarm.Status.Words
 
   test "the line shows the view's number, and names robots that it does not hear" do
     line = fn fields -> inspect(struct!(%Status{robot: :mag1, age_ms: 5}, fields)) end
@@ -132,7 +133,7 @@ defmodule Swarm.StatusTest do
     assert {:ok, %{blocked_by: "mag2"}} = Status.Row.decode(:mag1, row, 10)
     assert {:ok, %{blocked_by: nil}} = Status.Row.decode(:mag1, Map.delete(row, :blocked_by), 10)
 
-    for junk <- [:landmark, String.duplicate("x", 81)],
+    for junk <- [:landmark, String.duplicate("x", 321)],
         do: assert(Status.Row.decode(:mag1, %{row | blocked_by: junk}, 10) == :error)
   end
 

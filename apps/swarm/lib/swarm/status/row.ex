@@ -1,12 +1,13 @@
 defmodule Swarm.Status.Row do
   @moduledoc false
   # Packs a robot's status into a row of the blackboard, for nodes that cannot reach it: small, in whole numbers (mm,
-  # mrad, mm/s) and text. Pure. It omits the normal case: wheels that may turn, devices that are present, parts that do
-  # not hang. `uncertainty` is that of the pose in mm, if known.
+  # mrad, mm/s) and text. Pure. Which fields it has, and how each is sent, is in the table of `Swarm.Status`; `{:maybe, how}` is
+  # left out where it is `nil` or says the normal case: wheels that may turn, parts that do not hang.
   alias Hal.Pose
+  alias Swarm.Blackboard.Codec
   alias Swarm.Status
+  alias Swarm.Status.{Frame, Sight}
   alias Swarm.Wire
-  alias Swarm.Blackboard
 
   # Longer than any name: text from outside is not printed at any length.
   @words 80
@@ -16,174 +17,160 @@ defmodule Swarm.Status.Row do
   @doc "A status as it is sent."
   @spec encode(Status.t()) :: map()
   def encode(%Status{} = status) do
-    {number, members} = status.view || {0, []}
-
-    %{
-      node: Atom.to_string(status.node),
-      state: Atom.to_string(status.state),
-      by: status.by && Atom.to_string(status.by),
-      pose: pose(status.pose),
-      speed: status.speed && round(status.speed * 1000),
-      limits: texts(status.limits),
-      estop: status.estop,
-      leader: status.leader && Atom.to_string(status.leader),
-      power: status.power,
-      offline: texts(for {device, {:offline, _reason}} <- status.health, do: device),
-      view: {number, texts(members)},
-      # Nearly always none, while it may hear many.
-      deaf_to: texts(members -- [status.robot | status.hears]),
-      rejected: status.rejected |> Map.values() |> Enum.sum(),
-      age_ms: status.age_ms
-    }
-    |> arming(status.arming)
-    |> offline(status)
-    |> given(:fault, status.fault)
-    |> given(:estop_file, status.estop_file && short(status.estop_file))
-    |> given(:blocked_by, status.blocked_by)
-    |> hung(status.hung)
-    |> given(:crashed, status.crashed && String.slice(status.crashed, 0, 3 * @words))
-    |> uncertain(status.uncertainty)
-    |> given(:frame, status.frame && Status.Frame.encode(status.frame))
-    |> given(:epoch, status.epoch)
-    |> given(:head, Status.Sight.encode(status.head))
-    |> given(:sees, Status.Sight.encode(status.sees))
-    |> given(:says, status.says && short(status.says))
+    for {field, how} <- Status.sent(),
+        {key, value} <- sent(how, field, Map.fetch!(status, field), status),
+        into: %{},
+        do: {key, value}
   end
 
-  defp hung(row, nil), do: row
+  defp sent({:maybe, how}, field, value, _status) do
+    case if(value == nil, do: nil, else: put(how, value)) do
+      nil -> []
+      value -> [{field, value}]
+    end
+  end
 
-  defp hung(row, {what, where, ago_ms}),
-    do: Map.put(row, :hung, {Atom.to_string(what), where, ago_ms})
-
-  defp uncertain(row, nil), do: row
-
-  defp uncertain(row, metres),
-    do: Map.put(row, :uncertainty, min(mm(metres), @unsure_mm))
-
-  # A mission's own words may be as long as it likes.
-  defp short(text) when is_binary(text),
-    do: text |> String.codepoints() |> Enum.take(@words) |> Enum.join()
-
-  defp short(_other), do: nil
-
-  defp given(row, _key, nil), do: row
-  defp given(row, key, value), do: Map.put(row, key, value)
-
-  defp offline(row, %{offline: lines}) when lines == %{}, do: row
+  defp sent(:view, _view, view, status) do
+    {number, members} = view || {0, []}
+    # Nearly always none, while it may hear many.
+    deaf_to = members -- [status.robot | status.hears]
+    [view: {number, texts(members)}, deaf_to: texts(deaf_to)]
+  end
 
   # In the order of the names.
-  defp offline(row, %{health: health, offline: lines}) do
-    words = for {device, {:offline, _reason}} <- health, do: Map.get(lines, device, "")
-    Map.put(row, :words, words)
+  defp sent(:offline, _health, health, %{offline: lines}) do
+    devices = for {device, {:offline, _reason}} <- health, do: device
+    words = if lines == %{}, do: [], else: [words: Enum.map(devices, &Map.get(lines, &1, ""))]
+    [{:offline, texts(devices)} | words]
   end
 
-  defp arming(row, :disarmed), do: Map.put(row, :arming, "disarmed")
-  defp arming(row, {:error, _reason}), do: Map.put(row, :arming, "error")
-  defp arming(row, _armed_or_unknown), do: row
+  defp sent(how, field, value, _status), do: [{field, put(how, value)}]
 
-  defp pose(nil), do: nil
-  defp pose(pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
+  defp put(_how, nil), do: nil
+  defp put(how, word) when how in [:name, :word], do: Atom.to_string(word)
+  defp put(:words, words), do: texts(words)
+  defp put(:pose, pose), do: {mm(pose.x), mm(pose.y), mm(pose.heading)}
+  defp put(:thousandths, number), do: mm(number)
+  defp put(:metres, metres), do: min(mm(metres), @unsure_mm)
+
+  defp put({:text, most}, "" <> text),
+    do: text |> String.codepoints() |> Enum.take(most) |> Enum.join()
+
+  defp put({:text, _most}, _other), do: nil
+  defp put(:arming, :disarmed), do: "disarmed"
+  defp put(:arming, {:error, _reason}), do: "error"
+  defp put(:arming, _armed), do: nil
+  defp put(:hung, {what, where, ago_ms}), do: {Atom.to_string(what), where, ago_ms}
+  defp put(:frame, frame), do: Frame.encode(frame)
+  defp put(how, sight) when how in [:head, :sight], do: Sight.encode(sight)
+  defp put(:sum, counts), do: counts |> Map.values() |> Enum.sum()
+  defp put(how, value) when how in [:number, :count, :boolean, :age], do: value
+
   defp mm(number), do: round(number * 1000)
   defp texts(names), do: Enum.map(names, &Atom.to_string/1)
 
   @doc "The status in a row of this age; `:error` for anything else."
   @spec decode(atom(), term(), age_ms :: non_neg_integer()) :: {:ok, Status.t()} | :error
-  def decode(robot, row, age_ms) do
-    with %{state: state, by: by, pose: pose, speed: speed, limits: limits, estop: estop} <- row,
-         %{node: node, leader: leader, power: power, offline: offline, view: view} <- row,
-         %{deaf_to: deaf_to, rejected: rejected, age_ms: was_ms} <- row,
-         {number, members} <- view,
-         {:ok, arming} <- armed(Map.get(row, :arming)),
-         words = Map.get(row, :words, []),
-         fault = Map.get(row, :fault),
-         {:ok, blocked_by} <- text(Map.get(row, :blocked_by)),
-         {:ok, hung} <- hangs(Map.get(row, :hung), age_ms),
-         {:ok, uncertainty} <- metres(Map.get(row, :uncertainty)),
-         {:ok, says} <- text(Map.get(row, :says), 4 * @words),
-         {:ok, crashed} <- text(Map.get(row, :crashed), 12 * @words),
-         {:ok, estop_file} <- text(Map.get(row, :estop_file), 4 * @words),
-         epoch = Map.get(row, :epoch),
-         true <- epoch == nil or Wire.number?(epoch),
-         true <- Enum.all?([limits, offline, members, deaf_to, words], &texts?/1),
-         true <- Enum.all?([node, state], &is_binary/1),
-         true <- Enum.all?([by, leader, fault], &(&1 == nil or is_binary(&1))),
-         true <- Enum.all?([rejected, number], &Wire.number?/1) and is_boolean(estop),
-         true <- speed == nil or Wire.number?(speed),
-         true <- pose == nil or Wire.pose?(pose),
-         true <- power == nil or is_number(power),
-         true <- was_ms == nil or Wire.number?(was_ms) do
-      members = names(members)
+  def decode(robot, row, age_ms) when is_map(row) do
+    Enum.reduce_while(Status.sent(), {:ok, %Status{robot: robot, from: :row}}, fn
+      {field, how}, {:ok, status} ->
+        case told(how, field, row, age_ms, robot) do
+          {:ok, fields} -> {:cont, {:ok, struct!(status, fields)}}
+          :error -> {:halt, :error}
+        end
+    end)
+  end
 
-      {:ok,
-       %Status{
-         robot: robot,
-         from: :row,
-         node: Blackboard.Codec.word(node),
-         state: Blackboard.Codec.word(state),
-         by: by && Blackboard.Codec.word(by),
-         pose: pose && place(pose),
-         uncertainty: uncertainty,
-         frame: Status.Frame.decode(Map.get(row, :frame)),
-         epoch: epoch,
-         head: Status.Sight.decode_head(Map.get(row, :head)),
-         sees: Status.Sight.decode(Map.get(row, :sees)),
-         speed: speed && speed / 1000,
-         limits: Enum.map(limits, &Blackboard.Codec.word/1),
-         estop: estop,
-         estop_file: estop_file,
-         arming: arming,
-         leader: leader && Blackboard.Codec.word(leader),
-         says: says,
-         blocked_by: blocked_by,
-         hung: hung,
-         crashed: crashed,
-         power: power,
-         health: Map.new(offline, &{Blackboard.Codec.word(&1), {:offline, :unknown}}),
-         offline:
-           for(
-             {name, line} <- Enum.zip(offline, words),
-             into: %{},
-             do: {Blackboard.Codec.word(name), line}
-           ),
-         fault: fault,
-         hears: members -- [robot | names(deaf_to)],
-         view: {number, members},
-         rejected: if(rejected > 0, do: %{all: rejected}, else: %{}),
-         age_ms: (was_ms || 0) + age_ms
-       }}
+  def decode(_robot, _other, _age_ms), do: :error
+
+  defp told({:maybe, how}, field, row, age_ms, _robot) do
+    case row do
+      %{^field => value} when value != nil -> named(field, get(how, value, age_ms))
+      _none -> {:ok, [{field, nil}]}
+    end
+  end
+
+  defp told(:view, _view, row, _age_ms, robot) do
+    with %{view: {number, members}, deaf_to: deaf_to} <- row,
+         true <- Wire.number?(number) and texts?(members) and texts?(deaf_to) do
+      members = names(members)
+      {:ok, view: {number, members}, hears: members -- [robot | names(deaf_to)]}
     else
       _other -> :error
     end
   end
 
-  defp armed(nil), do: {:ok, nil}
-  defp armed("disarmed"), do: {:ok, :disarmed}
-  defp armed("error"), do: {:ok, {:error, :unknown}}
-  defp armed(_other), do: :error
+  defp told(:offline, _health, row, _age_ms, _robot) do
+    words = Map.get(row, :words, [])
 
-  defp text(text, most \\ @words)
-  defp text(nil, _most), do: {:ok, nil}
-  defp text(text, most) when is_binary(text) and byte_size(text) <= most, do: {:ok, text}
-  defp text(_other, _most), do: :error
+    with %{offline: offline} <- row,
+         true <- texts?(offline) and texts?(words) do
+      devices = Enum.map(offline, &Codec.word/1)
 
-  defp hangs(nil, _age_ms), do: {:ok, nil}
+      {:ok,
+       health: Map.new(devices, &{&1, {:offline, :unknown}}),
+       offline: devices |> Enum.zip(words) |> Map.new()}
+    else
+      _other -> :error
+    end
+  end
 
-  defp hangs({what, where, ago_ms}, age_ms)
+  defp told(how, field, row, age_ms, _robot) do
+    with {:ok, value} <- Map.fetch(row, field), do: named(field, get(how, value, age_ms))
+  end
+
+  defp named(field, {:ok, value}), do: {:ok, [{field, value}]}
+  defp named(_field, :error), do: :error
+
+  defp get(:name, "" <> text, _age_ms), do: {:ok, Codec.word(text)}
+  defp get(:word, nil, _age_ms), do: {:ok, nil}
+  defp get(:word, "" <> text, _age_ms), do: {:ok, Codec.word(text)}
+  defp get(:pose, nil, _age_ms), do: {:ok, nil}
+  defp get(:thousandths, nil, _age_ms), do: {:ok, nil}
+  defp get(:number, number, _age_ms) when number == nil or is_number(number), do: {:ok, number}
+  defp get(:boolean, value, _age_ms) when is_boolean(value), do: {:ok, value}
+  defp get(:arming, "disarmed", _age_ms), do: {:ok, :disarmed}
+  defp get(:arming, "error", _age_ms), do: {:ok, {:error, :unknown}}
+  defp get(:frame, frame, _age_ms), do: {:ok, Frame.decode(frame)}
+  defp get(:head, head, _age_ms), do: {:ok, Sight.decode_head(head)}
+  defp get(:sight, sight, _age_ms), do: {:ok, Sight.decode(sight)}
+  defp get(:age, nil, age_ms), do: {:ok, age_ms}
+
+  defp get(:metres, mm, _age_ms) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
+
+  defp get({:text, most}, "" <> text, _age_ms) when byte_size(text) <= 4 * most, do: {:ok, text}
+
+  defp get(:hung, {what, where, ago_ms}, age_ms)
        when what in ["silent", "hung"] and is_binary(where) and is_integer(ago_ms) and ago_ms >= 0 do
     what = if what == "silent", do: :silent, else: :hung
     {:ok, {what, String.slice(where, 0, @words), ago_ms + age_ms}}
   end
 
-  defp hangs(_other, _age_ms), do: :error
+  defp get(:words, words, _age_ms),
+    do: if(texts?(words), do: {:ok, Enum.map(words, &Codec.word/1)}, else: :error)
 
-  defp metres(nil), do: {:ok, nil}
-  defp metres(mm) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
-  defp metres(_other), do: :error
+  defp get(:pose, pose, _age_ms) do
+    if Wire.pose?(pose) do
+      {x, y, heading} = pose
+      {:ok, Pose.new(x / 1000, y / 1000, heading / 1000)}
+    else
+      :error
+    end
+  end
+
+  defp get(how, number, age_ms) when how in [:thousandths, :count, :sum, :age] do
+    cond do
+      not Wire.number?(number) -> :error
+      how == :thousandths -> {:ok, number / 1000}
+      how == :age -> {:ok, number + age_ms}
+      how == :sum -> {:ok, if(number > 0, do: %{all: number}, else: %{})}
+      true -> {:ok, number}
+    end
+  end
+
+  defp get(_how, _other, _age_ms), do: :error
 
   defp texts?(list), do: Wire.list?(list, &is_binary/1)
 
-  defp names(texts),
-    do: for(text <- texts, {:ok, name} <- [Blackboard.Codec.robot(text)], do: name)
-
-  defp place({x, y, heading}), do: Pose.new(x / 1000, y / 1000, heading / 1000)
+  defp names(texts), do: for(text <- texts, {:ok, name} <- [Codec.robot(text)], do: name)
 end
