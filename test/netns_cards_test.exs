@@ -22,10 +22,10 @@ defmodule System.NetnsCardsTest do
   @moduledoc "Nodes on machines with several network cards, or none, each in a network namespace of its own."
   use ExUnit.Case, async: true
   alias Mesh.Distribution.Epmd
-  alias Mesh.Secret
   alias Swarm.EStop.Broadcaster
   alias Netns.Stopped
-  alias Vm.Net
+  alias Lab.Fleet.Network
+  alias Vm.{Fleet, Net}
   @moduletag :realtime
   @moduletag skip: why_not
   @moduletag timeout: 120_000
@@ -39,48 +39,25 @@ defmodule System.NetnsCardsTest do
     File.mkdir_p!(folder)
     net = Net.create(@names, folder)
     on_exit(fn -> Net.delete(net) end)
-    %{net: net, folder: folder}
+    {:ok, network} = Network.create(net, @names)
+    %{net: net, network: network, folder: folder}
   end
 
   # Nodes with a mesh, each in the space of its name, or of another one.
-  defp nodes(net, names \\ @names, options \\ [], space \\ & &1, env \\ []) do
-    flags =
-      ~w(-proto_dist Elixir.Mesh.Distribution.Tcp -kernel connect_all false -kernel dist_auto_connect never) ++
-        ~w(-start_epmd false -epmd_module Elixir.Mesh.Distribution.Epmd -kernel logger_level none) ++
-        ["-setcookie", net.prefix]
+  defp nodes(network, names \\ @names, options \\ [], space \\ & &1, env \\ []) do
+    fleet = Fleet.new()
 
-    nodes =
-      Vm.start(
-        for name <- names,
-            do: [
-              name: name,
-              host: "convoy",
-              flags: flags,
-              env: env,
-              through: ["ip", "netns", "exec", Net.space(net, space.(name))]
-            ]
-      )
+    abouts =
+      for name <- names do
+        vm = Keyword.merge(Network.vm(network, space.(name)), name: name, env: env)
+        port = if space.(name) == name, do: 4370, else: 0
+        mesh = Network.mesh(network, name) |> Keyword.merge([port: port] ++ options)
+        config = [logger: [level: :none], swarm: [mesh: mesh]]
+        %{name: name, vm: vm, main: &Vm.start_apps(&1, [:swarm], config)}
+      end
 
-    for {name, node} <- Enum.zip(names, nodes) do
-      secret = %Secret{
-        path: "",
-        key: :crypto.hash(:sha256, net.prefix),
-        cookie: :"#{net.prefix}",
-        fingerprint: ""
-      }
-
-      mesh =
-        [
-          secret: secret,
-          fleet: @names,
-          dist_port: Epmd.default_port("#{name}"),
-          port: if(space.(name) == name, do: 4370, else: 0)
-        ] ++ options
-
-      :ok = Vm.start_apps(node, [:swarm], logger: [level: :none], swarm: [mesh: mesh])
-    end
-
-    nodes
+    fleet |> Fleet.start(abouts) |> Fleet.await()
+    for name <- names, do: Fleet.vm(fleet, name)
   end
 
   defp alive(node), do: Vm.call(node, Mesh, :alive, [])
@@ -108,14 +85,15 @@ defmodule System.NetnsCardsTest do
   end
 
   test "without a default route, and with one by another card, nodes meet, and stops arrive", %{
-    net: net
+    net: net,
+    network: network
   } do
     for who <- @names do
       Net.ip(net, who, ~w(link add eth1 type veth peer name nobody))
       for card <- ~w(eth1 nobody), do: Net.ip(net, who, ~w(link set #{card} up))
     end
 
-    [one, two] = nodes = nodes(net)
+    [one, two] = nodes = nodes(network)
     eventually(fn -> meet?(nodes) end)
     eventually(fn -> Vm.call(one, Node, :list, []) == [two.node] end)
     stop(one, two)
@@ -127,7 +105,7 @@ defmodule System.NetnsCardsTest do
       Net.ip(net, who, ~w(route add default via 192.168.#{n}.2))
     end
 
-    [one, two] = nodes = nodes(net)
+    [one, two] = nodes = nodes(network)
     eventually(fn -> meet?(nodes) end)
     stop(two, one)
   end
@@ -135,10 +113,11 @@ defmodule System.NetnsCardsTest do
   @tag long: true, realtime: :long
   test "cards that come and go are followed, and a network that is gone is told once", %{
     net: net,
+    network: network,
     folder: folder
   } do
     Net.ip(net, :mag1, ~w(link set eth0 down))
-    [one, two] = nodes = nodes(net)
+    [one, two] = nodes = nodes(network)
     eventually(fn -> fault(one) end)
     log = log(one, folder)
     assert fault(one) == "no network card is up and has an IPv4 address"
@@ -185,35 +164,36 @@ defmodule System.NetnsCardsTest do
   end
 
   @tag long: true, realtime: :long
-  test "a cable that is pulled is told by the name of its card", %{net: net} do
-    [one] = nodes(net, [:mag1])
+  test "a cable that is pulled is told by the name of its card", %{net: net, network: network} do
+    [one] = nodes(network, [:mag1])
     Net.ip(net, :switch, ~w(link set p1 down))
     assert eventually(fn -> fault(one) end) == "eth0 is not connected"
   end
 
-  test "nodes of one machine meet without any network", %{net: net} do
+  test "nodes of one machine meet without any network", %{net: net, network: network} do
     Net.ip(net, :mag1, ~w(link set eth0 down))
-    [one, two] = nodes(net, @names, [], fn _name -> :mag1 end)
+    [one, two] = nodes(network, @names, [], fn _name -> :mag1 end)
     eventually(fn -> meet?([one, two]) end)
     Vm.stop(two)
     assert eventually(fn -> fault(one) end) == "no network card is up and has an IPv4 address"
   end
 
   @tag long: true, realtime: :long
-  test "what nobody can be sent is told where multicast is off", %{net: net} do
-    [one] = nodes(net, [:mag1], multicast: false, peers: ["192.168.77.7:4370"])
+  test "what nobody can be sent is told where multicast is off", %{network: network} do
+    [one] = nodes(network, [:mag1], multicast: false, peers: ["192.168.77.7:4370"])
     assert eventually(fn -> fault(one) end) == "nothing can be sent: network is unreachable"
   end
 
   test "a node with a card is heard and connected by that one, also by its next address", %{
-    net: net
+    net: net,
+    network: network
   } do
     Net.ip(net, :mag1, ~w(link add eth1 type veth peer name nobody))
     for card <- ~w(eth1 nobody), do: Net.ip(net, :mag1, ~w(link set #{card} up))
     Net.ip(net, :mag1, ~w(addr add 10.78.0.1/24 dev eth1))
     Net.ip(net, :mag1, ~w(route add default via 10.78.0.2))
-    [two] = nodes(net, [:mag2])
-    [one] = with_interface(net, "eth0")
+    [two] = nodes(network, [:mag2])
+    [one] = with_interface(network, "eth0")
     met = fn -> meet?([one, two]) and Vm.call(two, Node, :list, []) == [one.node] end
     eventually(met)
     assert addresses(one) == [{10, 77, 0, 1}]
@@ -233,8 +213,8 @@ defmodule System.NetnsCardsTest do
   end
 
   @tag long: true, realtime: :long
-  test "an interface that is absent is waited for, in words", %{net: net} do
-    [two] = nodes(net, [:mag2])
+  test "an interface that is absent is waited for, in words", %{net: net, network: network} do
+    [two] = nodes(network, [:mag2])
 
     for {interface, line, comes} <- [
           {"10.77.0.9",
@@ -243,7 +223,7 @@ defmodule System.NetnsCardsTest do
           {"wlan0", "waits for wlan0, which is no card of this machine; there are eth0, lo",
            ~w(link set eth0 name wlan0)}
         ] do
-      [one] = with_interface(net, interface)
+      [one] = with_interface(network, interface)
       assert eventually(fn -> fault(one) end) == line
       if interface == "wlan0", do: Net.ip(net, :mag1, ~w(link set eth0 down))
       Net.ip(net, :mag1, comes)
@@ -257,8 +237,8 @@ defmodule System.NetnsCardsTest do
   end
 
   # As `bin/node` and releases give it: to the distribution by the environment, to the mesh as an option.
-  defp with_interface(net, interface),
-    do: nodes(net, [:mag1], [interface: interface], & &1, [{"CONVOY_INTERFACE", interface}])
+  defp with_interface(network, interface),
+    do: nodes(network, [:mag1], [interface: interface], & &1, [{"CONVOY_INTERFACE", interface}])
 
   # Of the datagrams of a node.
   defp addresses(node) do

@@ -36,7 +36,7 @@ defmodule System.NetnsStrangersTest do
     net = Fleet.net(fleet)
     on_exit(fn -> Net.delete(net) end)
     stranger = Vm.start_one(through: ["ip", "netns", "exec", Net.space(net, :stranger)])
-    ship(stranger)
+    Fleet.ship(stranger, @modules)
     assert eventually(fn -> connected?(fleet) end)
     %{fleet: fleet, stranger: stranger}
   end
@@ -51,11 +51,6 @@ defmodule System.NetnsStrangersTest do
       ["-proto_dist", "Elixir.Mesh.Distribution.Tls"] ++
         ["-ssl_dist_optfile", Path.join([certs, "#{robot}", "ssl_dist.conf"])]
     end
-  end
-
-  defp ship(vm) do
-    for {module, code} <- @modules,
-        do: {:module, _} = Vm.call(vm, :code, :load_binary, [module, ~c"test", code])
   end
 
   @calm_ms 3_000
@@ -127,7 +122,7 @@ defmodule System.NetnsStrangersTest do
     %{fleet: fleet} = context
     net = Fleet.net(fleet)
     program = Vm.start_one(through: ["ip", "netns", "exec", Net.space(net, :mag1)])
-    ship(program)
+    Fleet.ship(program, @modules)
     before = state(fleet)
     began = now()
     arguments = [Net.address(net, :mag2), Epmd.default_port("mag2"), 2_000, @at_once]
@@ -183,13 +178,8 @@ defmodule System.NetnsStrangersTest do
       atoms: Fleet.call(fleet, :mag2, :erlang, :system_info, [:atom_count]),
       bytes: Fleet.call(fleet, :mag2, :erlang, :memory, [:total]),
       ports: length(Fleet.call(fleet, :mag2, Port, :list, [])),
-      resident: resident(Fleet.node(fleet, :mag2).pid)
+      resident: div(Vm.resident(Fleet.node(fleet, :mag2)), 1024)
     }
-  end
-
-  defp resident(pid) do
-    [_line, kilobytes] = Regex.run(~r/VmRSS:\s+(\d+)/, File.read!("/proc/#{pid}/status"))
-    String.to_integer(kilobytes)
   end
 
   defp now, do: System.monotonic_time(:millisecond)

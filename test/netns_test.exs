@@ -1,144 +1,12 @@
-Code.require_file("netns/load.exs", __DIR__)
-modules = :persistent_term.get(:netns_modules)
+Code.require_file("netns/case.exs", __DIR__)
 why_not = Vm.Net.why_not()
 if why_not, do: IO.puts("the tests in network namespaces are skipped: #{why_not}")
 
+# Each is a module of its own, so that they wait side by side.
 defmodule System.NetnsTest do
-  @moduledoc """
-  Five whole robots, each on a node of its own in a network namespace of its own, in one world of
-  bodies that no cut of the network touches: real radios, real distribution, real time. What is
-  asserted is read from the logs that the nodes write.
-
-  Never do two that reach each other both lead for longer than a lease. Where the network has just
-  brought the two together, that counts from 2 s after it did (`Netns.Story.two_leaders/1`). All that
-  commit a round commit the same. Healed, all are one formation within 10 s.
-
-  The landmark stands at {0, 0}; the robots begin about where they will stand, abreast, so that what
-  is measured is how they agree, and not how far they drive. With `FIGURES=1` each test prints what it has measured.
-  """
-  use ExUnit.Case, async: false
-  @moduletag :realtime
-  import Swarm.Case, only: [order: 1]
-  alias Hal.Pose
-  alias Netns.{Fleet, Log, Story}
-  alias Vm.Net
-
-  @moduletag timeout: 120_000
-  @moduletag skip: why_not
-
-  @places [mag1: 0.0, mag2: 1.0, mag3: -1.0, mag4: 2.0, mag5: -2.0]
-  @all Keyword.keys(@places)
-  # The first leads; each robot's place in this line is where it stands in the other one, too.
-  @larger [:mag1, :mag2, :mag4]
-  @smaller [:mag3, :mag5]
-  @parts [@larger, @smaller]
-  @mission [formation: {:line, 1.0}, assign: :cost]
-
-  @lease_ms 1_500
+  @moduledoc "Networks that are cut in two (`Netns.Case`)."
+  use Netns.Case, async: true
   @healed_ms 10_000
-  # From 0.5 m/s by 0.5 m/s2, and what the wheels lag behind: then a body that was told to stand does.
-  @brakes_ms 1_500
-  @estop_ms 200
-  # From a link that works again to what it was kept from: a heartbeat comes each 200 ms.
-  @heard_ms 1_000
-  @gone_ms 2_000
-  # How far from its place a body may stand: 0.25 m by its own judgement, and what it errs itself.
-  @place_m 0.35
-  # Till then what is judged by the logs' times has happened on the busiest machine.
-  @patience_ms 60_000
-  @modules modules
-
-  setup do
-    folder =
-      Path.join(System.tmp_dir!(), "convoy-netns-#{System.pid()}-#{:rand.uniform(1_000_000)}")
-
-    File.mkdir_p!(folder)
-
-    poses = for {robot, y} <- @places, do: {robot, Pose.new(-1.7, y, :math.atan2(-y, 1.7))}
-
-    {:ok, fleet} = Fleet.start_link({poses, folder, @modules, []})
-    net = Fleet.net(fleet)
-    on_exit(fn -> Net.delete(net) end)
-    met(fleet)
-    %{fleet: fleet}
-  end
-
-  # All know all, by both ways.
-  defp met(fleet) do
-    Fleet.await(fleet, "all have met", @patience_ms, fn _lines ->
-      Enum.all?(@all, fn robot ->
-        Fleet.call(fleet, robot, Swarm.Directory, :robots, []) == @all and
-          map_size(Fleet.call(fleet, robot, Mesh, :robots, [])) == length(@all) - 1
-      end)
-    end)
-  end
-
-  defp start(fleet, options \\ []) do
-    :ok = order(fn -> Fleet.call(fleet, :mag1, Swarm, :start, [@mission ++ options]) end)
-    Log.now()
-  end
-
-  # When it first held, by the logs, in ms from then on.
-  defp when?(fleet, what, from, holds?) do
-    us = Fleet.await(fleet, what, @patience_ms, &Story.first(&1, from, holds?))
-    since(us, from)
-  end
-
-  defp led(fleet, from, robots),
-    do: when?(fleet, "one leads #{inspect(robots)}", from, &(Story.leader(&1, robots) != nil))
-
-  defp formed(fleet, from, robots \\ @all) do
-    ms = when?(fleet, "#{inspect(robots)} are formed", from, &Story.formed?(&1, robots))
-    now = Story.now(Fleet.lines(fleet))
-    assert Story.error(now, Story.leader(now, robots)) <= @place_m
-    ms
-  end
-
-  defp leader(fleet, robots \\ @all), do: Story.leader(Story.now(Fleet.lines(fleet)), robots)
-  defp since(us, from), do: (us - from) / 1_000
-
-  # Who has led, or followed whom, since then, where that is another than before.
-  defp changes(fleet, from) do
-    {before, later} = Enum.split_while(Fleet.lines(fleet), &(elem(&1, 0) < from))
-    now = Story.now(before)
-
-    for {_, who, :claim, claim} <- later,
-        role(claim) != role(now.claims[who]),
-        do: {who, claim}
-  end
-
-  defp role(claim), do: claim && {claim.phase, claim.leader, claim.epoch}
-
-  # Lets time pass with the network as it is.
-  defp last(from, ms) do
-    rest = max(ceil(ms - since(Log.now(), from)), 0)
-    Process.send_after(self(), :over, rest)
-    assert_receive :over, rest + 1_000
-  end
-
-  # All that is told of these robots since then, of one kind.
-  defp told(fleet, kind, from, robots \\ @all) do
-    for {us, who, ^kind, value} <- Story.lines(Fleet.lines(fleet), kind, from, robots),
-        do: {who, since(us, from), value}
-  end
-
-  # What must hold in every run, whatever was done to the network. `from` is when the mission was started
-  # last: a new one counts its rounds anew.
-  defp lawful(fleet, what, from, figures) do
-    lines = Fleet.lines(fleet)
-    both = Story.two_leaders(lines)
-    assert both.late <= @lease_ms, "two led for #{both.late} ms"
-
-    assert Story.torn_rounds(lines, from) == []
-
-    if System.get_env("FIGURES") do
-      figures = figures ++ [two_leaders: both.all, late: both.late]
-
-      IO.puts(
-        "#{what}: " <> Enum.map_join(figures, ", ", fn {k, ms} -> "#{k} #{round(ms)} ms" end)
-      )
-    end
-  end
 
   test "cut in two, each part leads itself; healed, all are one, and old commands are dropped",
        %{fleet: fleet} do
@@ -179,6 +47,118 @@ defmodule System.NetnsTest do
       healed_led: led,
       healed_formed: formed
     )
+  end
+
+  @tag long: true, realtime: :long
+  test "under the policy of a majority only the larger part leads itself", %{fleet: fleet} do
+    begun = start(fleet, policy: :majority)
+    formed(fleet, begun)
+    cut = Fleet.cut(fleet, @parts, &Net.split(&1, @parts))
+    led = led(fleet, cut + @gone_ms * 1_000, @larger) + @gone_ms
+
+    waiting =
+      when?(fleet, "the smaller part waits", cut, fn now ->
+        Enum.all?(@smaller, &match?(%{phase: :wait}, now.claims[&1]))
+      end)
+
+    formed(fleet, cut + @gone_ms * 1_000, @larger)
+    last(cut, waiting + 2 * @gone_ms)
+    healed = Fleet.heal(fleet)
+    assert for({_, _, %{phase: :lead}} <- told(fleet, :claim, cut, @smaller), do: :lead) == []
+    back = led(fleet, healed, @all)
+    formed = formed(fleet, healed)
+    assert formed <= @healed_ms
+
+    lawful(fleet, "majority", begun,
+      apart: led,
+      waiting: waiting,
+      healed_led: back,
+      healed_formed: formed
+    )
+  end
+end
+
+defmodule System.NetnsStopTest do
+  @moduledoc "An emergency stop in a network that is cut."
+  use Netns.Case, async: true
+
+  @estop_ms 200
+  # From 0.5 m/s by 0.5 m/s2, and what the wheels lag behind: then a body that was told to stand does.
+  @brakes_ms 1_500
+  # From a link that works again to what it was kept from: a heartbeat comes each 200 ms.
+  @heard_ms 1_000
+
+  test "an e-stop in a cut reaches all that are reachable, and the others once healed", %{
+    fleet: fleet
+  } do
+    start(fleet)
+    cut = Fleet.cut(fleet, @parts, &Net.split(&1, @parts))
+    last(cut, @gone_ms)
+    pressed = Log.now()
+    Fleet.call(fleet, :mag1, Swarm, :estop, [])
+    reached = stopped(fleet, pressed, @larger)
+    assert reached <= @estop_ms
+    last(pressed, @gone_ms)
+    assert told(fleet, :estop, pressed, @smaller) == []
+
+    # Some hear it before all the network is whole.
+    healed = Fleet.heal(fleet)
+    late = stopped(fleet, pressed, @smaller) - since(healed, pressed)
+    assert late <= @heard_ms
+
+    # Nobody moves till a person says so, and then they can.
+    still = Log.now()
+    last(still, 3_000)
+    moved = for {who, ms, pose} <- told(fleet, :body, still), ms > @brakes_ms, do: {who, ms, pose}
+    assert moved == []
+    # The stop needs the radio only; who answers for a reset, is connected.
+    met(fleet)
+    assert told(fleet, :reset, pressed) == []
+    assert order(fn -> Fleet.call(fleet, :mag5, Swarm, :reset, []) end) == :ok
+    again = start(fleet)
+
+    Fleet.await(fleet, "they drive", @patience_ms, fn _lines ->
+      told(fleet, :body, again) != []
+    end)
+
+    lawful(fleet, "e-stop", again, reached: reached, healed_reached: late)
+  end
+
+  # When the last of these stood, in ms from then on.
+  defp stopped(fleet, from, robots) do
+    Fleet.await(fleet, "#{inspect(robots)} are stopped", @patience_ms, fn lines ->
+      stops =
+        Map.new(
+          Enum.reverse(Story.lines(lines, :estop, from, robots)),
+          &{elem(&1, 1), elem(&1, 0)}
+        )
+
+      if map_size(stops) == length(robots), do: stops |> Map.values() |> Enum.max() |> since(from)
+    end)
+  end
+end
+
+defmodule System.NetnsKillTest do
+  @moduledoc "Links and nodes that fail one by one."
+  use Netns.Case, async: true
+
+  test "kill -9 of the leader: another leads; its node comes back and follows", %{fleet: fleet} do
+    begun = start(fleet)
+    formed(fleet, begun)
+    leader = leader(fleet)
+    killed = Fleet.kill(fleet, leader)
+    rest = @all -- [leader]
+    led = led(fleet, killed, rest)
+    formed = formed(fleet, killed, rest)
+    next = leader(fleet, rest)
+
+    Fleet.revive(fleet, leader)
+    on = Log.now()
+    met(fleet)
+    start(fleet, robots: [leader])
+    back = led(fleet, on, @all)
+    assert leader(fleet) == next
+    lawful(fleet, "kill -9 of the leader", begun, led: led, formed: formed, back: back)
   end
 
   @tag long: true, realtime: :long
@@ -265,101 +245,5 @@ defmodule System.NetnsTest do
     assert told(fleet, :view, at) == []
     assert changes(fleet, at) == []
     lawful(fleet, "another address", begun, [])
-  end
-
-  test "an e-stop in a cut reaches all that are reachable, and the others once healed", %{
-    fleet: fleet
-  } do
-    start(fleet)
-    cut = Fleet.cut(fleet, @parts, &Net.split(&1, @parts))
-    last(cut, @gone_ms)
-    pressed = Log.now()
-    Fleet.call(fleet, :mag1, Swarm, :estop, [])
-    reached = stopped(fleet, pressed, @larger)
-    assert reached <= @estop_ms
-    last(pressed, @gone_ms)
-    assert told(fleet, :estop, pressed, @smaller) == []
-
-    # Some hear it before all the network is whole.
-    healed = Fleet.heal(fleet)
-    late = stopped(fleet, pressed, @smaller) - since(healed, pressed)
-    assert late <= @heard_ms
-
-    # Nobody moves till a person says so, and then they can.
-    still = Log.now()
-    last(still, 3_000)
-    moved = for {who, ms, pose} <- told(fleet, :body, still), ms > @brakes_ms, do: {who, ms, pose}
-    assert moved == []
-    # The stop needs the radio only; who answers for a reset, is connected.
-    met(fleet)
-    assert told(fleet, :reset, pressed) == []
-    assert order(fn -> Fleet.call(fleet, :mag5, Swarm, :reset, []) end) == :ok
-    again = start(fleet)
-
-    Fleet.await(fleet, "they drive", @patience_ms, fn _lines ->
-      told(fleet, :body, again) != []
-    end)
-
-    lawful(fleet, "e-stop", again, reached: reached, healed_reached: late)
-  end
-
-  # When the last of these stood, in ms from then on.
-  defp stopped(fleet, from, robots) do
-    Fleet.await(fleet, "#{inspect(robots)} are stopped", @patience_ms, fn lines ->
-      stops =
-        Map.new(
-          Enum.reverse(Story.lines(lines, :estop, from, robots)),
-          &{elem(&1, 1), elem(&1, 0)}
-        )
-
-      if map_size(stops) == length(robots), do: stops |> Map.values() |> Enum.max() |> since(from)
-    end)
-  end
-
-  @tag long: true, realtime: :long
-  test "under the policy of a majority only the larger part leads itself", %{fleet: fleet} do
-    begun = start(fleet, policy: :majority)
-    formed(fleet, begun)
-    cut = Fleet.cut(fleet, @parts, &Net.split(&1, @parts))
-    led = led(fleet, cut + @gone_ms * 1_000, @larger) + @gone_ms
-
-    waiting =
-      when?(fleet, "the smaller part waits", cut, fn now ->
-        Enum.all?(@smaller, &match?(%{phase: :wait}, now.claims[&1]))
-      end)
-
-    formed(fleet, cut + @gone_ms * 1_000, @larger)
-    last(cut, waiting + 2 * @gone_ms)
-    healed = Fleet.heal(fleet)
-    assert for({_, _, %{phase: :lead}} <- told(fleet, :claim, cut, @smaller), do: :lead) == []
-    back = led(fleet, healed, @all)
-    formed = formed(fleet, healed)
-    assert formed <= @healed_ms
-
-    lawful(fleet, "majority", begun,
-      apart: led,
-      waiting: waiting,
-      healed_led: back,
-      healed_formed: formed
-    )
-  end
-
-  test "kill -9 of the leader: another leads; its node comes back and follows", %{fleet: fleet} do
-    begun = start(fleet)
-    formed(fleet, begun)
-    leader = leader(fleet)
-    killed = Fleet.kill(fleet, leader)
-    rest = @all -- [leader]
-    led = led(fleet, killed, rest)
-    formed = formed(fleet, killed, rest)
-    next = leader(fleet, rest)
-
-    Fleet.revive(fleet, leader)
-    on = Log.now()
-    met(fleet)
-    start(fleet, robots: [leader])
-    back = led(fleet, on, @all)
-    assert leader(fleet) == next
-    lawful(fleet, "kill -9 of the leader", begun, led: led, formed: formed, back: back)
   end
 end

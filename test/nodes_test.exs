@@ -7,7 +7,7 @@ defmodule System.NodesLeaderTest do
   @moduletag :realtime
 
   test "kill -9 of the leader's process: another leads, and the report tells", %{environment: env} do
-    port = start("--robots 3 --duration 45", env)
+    port = start("--robots 3 --duration 25", env)
     said = await(port, ~r/elected +\w+ leads/)
     [_line, leader] = Regex.run(~r/elected +(\w+) leads/, said)
     processes = for name <- ["mag1", "mag2", "min1", "world"], do: pid(said, name)

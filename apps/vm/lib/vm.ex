@@ -117,6 +117,10 @@ defmodule Vm do
   @spec call(t(), module(), atom(), list(), timeout()) :: term()
   def call(vm, m, f, a, timeout \\ 10_000), do: :peer.call(vm.peer, m, f, a, timeout)
 
+  @doc "Calls a function there, and waits neither for its answer nor for a frozen one."
+  @spec cast(t(), module(), atom(), list()) :: :ok
+  def cast(vm, m, f, a), do: :peer.cast(vm.peer, m, f, a)
+
   @doc "Sends a signal to its process of the operating system: KILL, STOP, CONT. One that is gone hears nothing."
   @spec signal(t() | [t()] | (os_pid :: String.t()), String.t()) :: :ok
   def signal(vms, signal) do
@@ -124,6 +128,36 @@ defmodule Vm do
     _gone = System.cmd("kill", ["-#{signal}" | pids], stderr_to_stdout: true)
     :ok
   end
+
+  @doc "The resident set of its process in bytes, `nil` where it is not known."
+  @spec resident(t()) :: pos_integer() | nil
+  def resident(vm) do
+    with {:ok, text} <- File.read("/proc/#{vm.pid}/status"),
+         [_line, kilobytes] <- Regex.run(~r/VmRSS:\s+(\d+)/, text),
+         do: 1024 * String.to_integer(kilobytes),
+         else: (_unknown -> nil)
+  end
+
+  @doc "Freezes it: it is there, and silent. The signal is on its way when `kill` returns, and every thread stops by itself."
+  @spec freeze(t()) :: :ok
+  def freeze(vm) do
+    signal(vm, "STOP")
+    await_stopped(vm.pid)
+  end
+
+  defp await_stopped(pid, tries \\ 100_000) do
+    states = for file <- Path.wildcard("/proc/#{pid}/task/*/stat"), do: state(File.read(file))
+
+    cond do
+      Enum.all?(states, &(&1 in ["T", :ended])) -> :ok
+      tries == 0 -> raise "process #{pid} does not stop"
+      true -> await_stopped(pid, tries - 1)
+    end
+  end
+
+  # After the name, which is in brackets and may hold anything.
+  defp state({:ok, stat}), do: stat |> String.split(") ") |> List.last() |> String.first()
+  defp state({:error, _gone}), do: :ended
 
   @doc "Ends them, frozen or not and without asking them, and waits until they are gone."
   @spec stop(t() | [t()]) :: :ok

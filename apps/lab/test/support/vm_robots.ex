@@ -99,18 +99,8 @@ defmodule Lab.VmRobots do
   end
 
   @doc "Sends a signal to the VM, and waits until it has come."
-  def signal(%{vm: vm}, "STOP") do
-    Vm.signal(vm, "STOP")
-    eventually(fn -> Enum.all?(states(vm.pid), &(&1 == "T")) end)
-  end
-
+  def signal(%{vm: vm}, "STOP"), do: Vm.freeze(vm)
   def signal(%{vm: vm}, signal), do: Vm.signal(vm, signal)
-
-  defp states(pid) do
-    for file <- Path.wildcard("/proc/#{pid}/task/*/stat"),
-        {:ok, stat} <- [File.read(file)],
-        do: stat |> String.split(") ") |> List.last() |> String.first()
-  end
 
   @doc "Checks for so many milliseconds, every 10, and returns the first that is not `nil` or `false`."
   def watch(ms, look), do: watch_until(now_ms() + ms, look)

@@ -1,6 +1,6 @@
 defmodule Swarm.Cluster do
   @moduledoc """
-  Further nodes for tests (`Vm`), with the application `:swarm` running on each.
+  Further nodes for tests (`Vm.Fleet`), with the application `:swarm` running on each.
 
       @tag :cluster
       test "…" do
@@ -11,6 +11,7 @@ defmodule Swarm.Cluster do
   partitions are prevented. A node ends with the test that started it, or when it is killed.
   """
   import ExUnit.Callbacks, only: [on_exit: 1]
+  alias Vm.Fleet
 
   # Cheap starts on a machine with few processors.
   @flags ~w(-kernel prevent_overlapping_partitions false -kernel connect_all false +S 1 +sbwt none)
@@ -27,15 +28,23 @@ defmodule Swarm.Cluster do
 
     flags = @flags ++ options[:flags] ++ ["-setcookie", Atom.to_string(Node.get_cookie())]
     config = Keyword.merge([logger: [level: :critical]], options[:env])
-    vms = Vm.start(for _ <- 1..count, do: [name: :peer.random_name(), flags: flags])
+    main = &Vm.start_apps(&1, options[:apps], config)
+    names = for _ <- 1..count, do: :"c#{System.pid()}_#{System.unique_integer([:positive])}"
+    fleet = Fleet.new()
 
+    Fleet.start(
+      fleet,
+      for(name <- names, do: %{name: name, vm: [name: name, flags: flags], main: main})
+    )
+
+    Fleet.await(fleet)
+    vms = for name <- names, do: Fleet.vm(fleet, name)
     on_exit(fn -> Vm.stop(vms) end)
 
     nodes =
-      for vm <- vms do
-        :ok = Vm.start_apps(vm, options[:apps], config)
+      for {name, vm} <- Enum.zip(names, vms) do
         true = Node.connect(vm.node)
-        :persistent_term.put({__MODULE__, vm.node}, vm.pid)
+        :persistent_term.put({__MODULE__, vm.node}, {fleet, name})
         vm.node
       end
 
@@ -52,38 +61,21 @@ defmodule Swarm.Cluster do
 
   @doc "Ends a node as `kill -9` does, and waits until this node knows."
   @spec kill(node()) :: :ok
-  def kill(node), do: signal(node, "KILL", fn -> await_down(node) end)
+  def kill(node) do
+    :ok = tell(node, :kill)
+    await_down(node)
+  end
 
   @doc "Freezes a node: it is there, and silent. `thaw/1` lets it go on."
   @spec freeze(node()) :: :ok
-  def freeze(node), do: signal(node, "STOP", fn -> await_stopped(process(node)) end)
+  def freeze(node), do: tell(node, :freeze)
 
   @doc "Lets a frozen node go on."
   @spec thaw(node()) :: :ok
-  def thaw(node), do: Vm.signal(process(node), "CONT")
+  def thaw(node), do: tell(node, :thaw)
 
-  defp signal(node, name, afterwards) do
-    Vm.signal(process(node), name)
-    afterwards.()
-    :ok
-  end
-
-  defp process(node), do: :persistent_term.get({__MODULE__, node})
-
-  # The signal is on its way when `kill` returns. Every thread stops by itself.
-  defp await_stopped(pid, tries \\ 100_000) do
-    states = for file <- Path.wildcard("/proc/#{pid}/task/*/stat"), do: state(File.read(file))
-
-    cond do
-      Enum.all?(states, &(&1 in ["T", :ended])) -> :ok
-      tries == 0 -> raise "process #{pid} does not stop"
-      true -> await_stopped(pid, tries - 1)
-    end
-  end
-
-  # After the name, which is in brackets and may hold anything.
-  defp state({:ok, stat}), do: stat |> String.split(") ") |> List.last() |> String.first()
-  defp state({:error, _gone}), do: :ended
+  defp tell(node, what),
+    do: apply(Fleet, what, Tuple.to_list(:persistent_term.get({__MODULE__, node})))
 
   defp await_down(node) do
     Node.monitor(node, true)

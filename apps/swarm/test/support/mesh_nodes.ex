@@ -1,6 +1,6 @@
 defmodule Swarm.MeshNodes do
   @moduledoc """
-  Real nodes, each a `Vm` of its own: whatever happens to their network the test still reaches them. They end with
+  Real nodes (`Vm.Fleet`): whatever happens to their network the test still reaches them. They end with
   the process that starts them, a test or a module's `setup_all`. Names and ports are new for each fleet: the tests
   of several checkouts may run at once.
 
@@ -14,11 +14,12 @@ defmodule Swarm.MeshNodes do
   with that part.
   """
   alias Mesh.Secret
+  alias Vm.Fleet
 
-  @enforce_keys [:vm, :node, :name]
+  @enforce_keys [:fleet, :vm, :node, :name]
   defstruct @enforce_keys
 
-  @type t :: %__MODULE__{vm: Vm.t(), node: node(), name: atom()}
+  @type t :: %__MODULE__{fleet: Fleet.t(), vm: Vm.t(), node: node(), name: atom()}
 
   @doc "Starts nodes."
   @spec start(pos_integer(), keyword()) :: [t()]
@@ -26,24 +27,18 @@ defmodule Swarm.MeshNodes do
     run = run()
     names = for n <- 1..count, do: :"t#{run}_#{n}"
     mesh = mesh(names, run, Keyword.get(options, :mesh, []))
-    names |> boot(options) |> join_all(mesh, options)
-  end
+    fleet = Fleet.new()
 
-  defp join_all(nodes, mesh, options) do
     if options[:one_by_one],
-      do: Enum.map(nodes, &prepare(&1, mesh, options)),
-      else:
-        Task.await_many(
-          for(n <- nodes, do: Task.async(fn -> prepare(n, mesh, options) end)),
-          30_000
-        )
+      do: Enum.flat_map(names, &boot(fleet, [&1], mesh, options)),
+      else: boot(fleet, names, mesh, options)
   end
 
   @doc "One more node of the same fleet, or one that was killed, again."
   @spec join([t()], atom(), keyword()) :: t()
   def join([one | _], name, options \\ []) do
     mesh = call(one, Application, :get_env, [:swarm, :mesh])
-    [name] |> boot(options) |> hd() |> prepare(mesh, options)
+    hd(boot(one.fleet, [name], mesh, options))
   end
 
   @doc "Calls a function there, over standard input and output."
@@ -75,19 +70,26 @@ defmodule Swarm.MeshNodes do
     |> Keyword.merge(options)
   end
 
-  defp boot(names, options) do
+  defp boot(fleet, names, mesh, options) do
     flags = Vm.fleet_flags() ++ Keyword.get(options, :args, [])
-
     place = if host = options[:host], do: [host: host, longnames: true], else: []
-    vms = Vm.start(for name <- names, do: [name: name, flags: flags] ++ place)
-    for {name, vm} <- Enum.zip(names, vms), do: %__MODULE__{vm: vm, node: vm.node, name: name}
-  end
-
-  defp prepare(node, mesh, options) do
     missions = Application.get_env(:swarm, :missions, [])
     config = [logger: [level: :none], swarm: [mesh: mesh, missions: missions]]
-    :ok = Vm.start_apps(node.vm, [:logger, :swarm], config)
-    if options[:robots], do: :ok = call(node, Swarm.MeshNodes.Wheels, :robot, [node.name])
-    node
+
+    main = fn vm, name ->
+      :ok = Vm.start_apps(vm, [:logger, :swarm], config)
+      if options[:robots], do: :ok = Vm.call(vm, Swarm.MeshNodes.Wheels, :robot, [name])
+    end
+
+    nodes =
+      for name <- names,
+          do: %{name: name, vm: [name: name, flags: flags] ++ place, main: &main.(&1, name)}
+
+    Fleet.start(fleet, nodes)
+    Fleet.await(fleet, names)
+
+    for name <- names,
+        vm = Fleet.vm(fleet, name),
+        do: %__MODULE__{fleet: fleet, vm: vm, node: vm.node, name: name}
   end
 end

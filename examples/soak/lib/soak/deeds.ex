@@ -3,9 +3,11 @@ defmodule Soak.Deeds do
   Does to a fleet what a schedule says (`Soak.Schedule`), and notes it for the judge before it takes effect.
   What is not possible now, such as to freeze a node that is down, is left out, and the journal says so.
   """
-  alias Soak.{Junk, Orders, Recorder, State, WorldHost}
+  alias Lab.Node.Log
+  alias Soak.{Fleet, Junk, Orders, State}
   alias Soak.Deeds.Shout
-  alias Soak.Fleet.{Network, Tree}
+  alias Soak.Fleet.Tree
+  alias Vm.Net
 
   @order_ms 8_000
 
@@ -30,7 +32,7 @@ defmodule Soak.Deeds do
 
   def carry_out(s, {:freeze, robot, ms} = deed) do
     with_node(s, robot, deed, fn s, vm ->
-      :ok = Vm.signal(vm, "STOP")
+      :ok = Vm.freeze(vm)
       Process.send_after(self(), {:later, {:thaw, robot, vm}}, ms)
       s = %{s | frozen: MapSet.put(s.frozen, robot)}
 
@@ -72,9 +74,14 @@ defmodule Soak.Deeds do
 
   def carry_out(s, {:landmark, place}) do
     with_node(s, :world, {:landmark, place}, fn s, vm ->
-      Orders.aside(fn -> Vm.call(vm, WorldHost, :move, [place], @order_ms) end, fn :ok ->
-        "the landmark moves"
-      end)
+      Orders.aside(
+        fn ->
+          Vm.call(vm, Lab.Node.World, :change, [Lab.Node.Fleet, {:move, place}], @order_ms)
+        end,
+        fn :ok ->
+          "the landmark moves"
+        end
+      )
 
       s
     end)
@@ -136,7 +143,7 @@ defmodule Soak.Deeds do
   end
 
   def end_of(s, :network) do
-    :ok = Network.heal(s.fleet.network)
+    :ok = Net.heal(s.fleet.network.place)
     s |> State.note({now(), :soak, :heal, nil}) |> State.write("the network is whole")
   end
 
@@ -150,7 +157,7 @@ defmodule Soak.Deeds do
   defp network(s, kind, ms, deed) do
     # Nobody waits for the last cut beyond the end of the run.
     Process.send_after(self(), {:later, :network}, ms)
-    pairs = Network.change(s.fleet.network, deed)
+    pairs = Fleet.cut(s.fleet.network.place, deed)
     event = if pairs == [], do: {now(), :soak, :network, :loss}, else: {now(), :soak, :cut, pairs}
     s |> State.count(kind) |> State.note(event) |> State.write(text(deed))
   end
@@ -172,5 +179,5 @@ defmodule Soak.Deeds do
 
   defp skip(s, deed), do: State.write(s, "left out, its node is not there: #{inspect(deed)}")
 
-  defp now, do: Recorder.now()
+  defp now, do: Log.now()
 end

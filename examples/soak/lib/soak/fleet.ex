@@ -1,118 +1,91 @@
 defmodule Soak.Fleet do
   @moduledoc """
-  Keeps the nodes of a run and what they have in common: one for each robot, one for the world, each with a keeper
-  (`Soak.Fleet.Keeper`). The robots stand abreast before the landmark. The first has the real drivers of a
-  Magellan, on emulated devices behind serial lines, so that there are port programs to be left behind.
+  Describes the nodes of a run: `Lab.Node.Fleet`, each started again 2 s after its end, as systemd does it
+  (`rel/convoy.service`). Where this machine allows it each robot has a network namespace (`Vm.Net`), so that links can
+  be cut. The first robot has the real drivers of a Magellan, on emulated devices behind serial lines, so that there are port
+  programs to be left behind.
   """
-  alias Soak.Fleet
-  alias Soak.Fleet.{Keeper, Network}
-  alias Soak.WorldHost
-  alias Hal.Pose
-  alias Lab.Trial.Setup
-  alias Sim.World
+  alias Lab.Node.{Fleet, Log}
+  alias Sim.World.Snapshot
+  alias Soak.Recorder
+  alias Vm.Net
 
-  @boot_ms 60_000
-
-  @enforce_keys [:robots, :folder, :network, :world, :starts, :mark, :keepers]
-  defstruct @enforce_keys
-
-  @type t :: %__MODULE__{}
+  @restart_ms 2_000
 
   @doc "Makes folder and network; nothing runs yet."
-  @spec create([atom()], integer(), boolean(), String.t()) :: t()
+  @spec create([atom()], integer(), boolean(), String.t()) :: Fleet.t()
   def create(robots, seed, namespaces?, mark) do
     folder = Path.join(System.tmp_dir!(), "convoy-soak-#{mark}")
     File.mkdir_p!(folder)
     File.chmod!(folder, 0o700)
-    starts = for {robot, n} <- Enum.with_index(robots), do: {robot, place(n)}
-    {:ok, map} = Sim.Floorplan.open("hall", length(robots))
+    place = if namespaces?, do: Net.create(robots, folder, [:stranger]), else: :loopback
+    [{_name, mission} | _] = Application.fetch_env!(:swarm, :missions)
 
-    bodies =
-      for {robot, pose} <- starts, do: %{id: robot, profile: Setup.profile(robot), pose: pose}
-
-    world = World.new!(map: map, robots: bodies, landmark: {0.0, 0.0}, seed: seed)
-    network = Network.create(robots, folder, namespaces?)
-
-    %__MODULE__{
-      robots: robots,
+    Fleet.new(%{
+      starts: Fleet.abreast(robots),
+      place: place,
       folder: folder,
-      network: network,
-      world: world,
-      starts: starts,
-      mark: mark,
-      keepers: :ets.new(__MODULE__, [])
-    }
+      mission: {mission, []},
+      world: [seed: seed],
+      hardware: [hd(robots)],
+      beside: fn name ->
+        if name == :world, do: [], else: [{Log, {folder, name, Recorder.looks(name), nil}}]
+      end,
+      nodes: [tell: self(), again_ms: @restart_ms, mark: mark]
+    })
   end
 
-  # At 0, 1, -1, 2, -2, … m, and all look at the landmark.
-  defp place(n) do
-    y = div(n + 1, 2) * if(rem(n, 2) == 1, do: 1.0, else: -1.0)
-    Pose.new(-1.7, y, :math.atan2(-y, 1.7))
+  @doc "How many collisions there had been by then, and the newest of them in words, newest first."
+  @spec collisions(Snapshot.t(), Sim.World.t()) :: {non_neg_integer(), [String.t()]}
+  def collisions(snapshot, begun) do
+    world = Snapshot.onto(begun, snapshot)
+    {world.collisions, Enum.map(world.contacts, &contact/1)}
   end
 
-  @doc "Starts the keepers, and so the nodes; they belong to the calling process."
-  @spec start(t()) :: :ok
-  def start(fleet) do
-    same = %{mark: fleet.mark, owner: self()}
-    nodes = [world(fleet) | Enum.map(fleet.robots, &robot(fleet, &1))]
-
-    for node <- nodes do
-      {:ok, pid} = Keeper.start_link(Map.merge(same, node))
-      :ets.insert(fleet.keepers, {node.name, pid})
-    end
-
-    :ok
+  defp contact({at_ms, parties, with_what}) do
+    wall = if with_what == :wall, do: " and a wall", else: ""
+    "at #{at_ms} ms of the world " <> Enum.map_join(parties, " and ", &party/1) <> wall
   end
 
-  defp world(%{world: world, folder: folder}) do
-    main = fn vm -> Vm.call(vm, WorldHost, :main, [world, folder], @boot_ms) end
-    options = [flags: Vm.fleet_flags() ++ ~w(-kernel logger_level none)]
-    %{name: :world, options: options, main: main}
+  defp party({id, {x, y}, linear}) do
+    [x, y, linear] = for metres <- [x, y, linear], do: Float.round(metres, 2)
+    "#{id} at (#{x}, #{y}), told #{linear} m/s"
   end
 
-  defp robot(%{network: network, folder: folder} = fleet, robot) do
-    hardware? = robot == hd(fleet.robots)
-
-    about = %{
-      id: robot,
-      hardware?: hardware?,
-      folder: folder,
-      mesh: Network.mesh(network, robot),
-      missions: Application.fetch_env!(:swarm, :missions)
-    }
-
-    main = fn vm ->
-      start = start(fleet, robot, if(hardware?, do: :zero, else: :on))
-      Vm.call(vm, Fleet.Node, :main, [Map.put(about, :start, start)], @boot_ms)
-    end
-
-    %{name: robot, options: Network.vm(network, robot), main: main}
+  @doc "Changes the network as a deed of `Soak.Schedule` says; says who reaches whom no more from then on."
+  @spec cut(Net.t(), tuple()) :: [{atom(), atom()}]
+  def cut(net, {:block, a, b, _ms}) do
+    :ok = Net.block(net, a, b)
+    [{a, b}]
   end
 
-  # The wheels of a real base begin to count when it is switched on; those in the world have counted all the time.
-  defp start(fleet, robot, wheels) do
-    case WorldHost.read(fleet.folder) do
-      {:ok, _at_us, snapshot} -> WorldHost.start(snapshot, fleet.world, robot, wheels)
-      {:error, _none_yet} -> fleet.starts[robot]
-    end
+  def cut(net, {:split, [one, other] = parts, _ms}) do
+    :ok = Net.split(net, parts)
+    for a <- one, b <- other, do: {a, b}
   end
 
-  @doc "Ends the keepers, and so the nodes."
-  @spec stop(t()) :: :ok
-  def stop(fleet) do
-    for {_name, pid} <- :ets.tab2list(fleet.keepers) do
-      Process.unlink(pid)
-      Process.exit(pid, :kill)
-    end
-
-    :ok
+  def cut(net, {:loss, share, _ms}) do
+    :ok = Net.lose(net, share)
+    []
   end
 
   @doc "Takes network and folder away."
-  @spec delete(t()) :: :ok
-  def delete(fleet) do
-    :ok = Network.delete(fleet.network)
-    _gone = File.rm_rf(fleet.folder)
+  @spec delete(Fleet.t()) :: :ok
+  def delete(%{network: %{place: place}, folder: folder}) do
+    if place != :loopback, do: :ok = Net.delete(place)
+    _gone = File.rm_rf(folder)
     :ok
+  end
+
+  @doc "Keeps the logs of a run beside its journal, in a folder of the same name without `.log`; returns it."
+  @spec keep(Fleet.t(), journal :: Path.t()) :: Path.t()
+  def keep(%{folder: folder}, journal) do
+    kept = Path.rootname(journal)
+    File.mkdir_p!(kept)
+
+    for path <- Path.wildcard(Path.join(folder, "*.log")),
+        do: File.cp!(path, Path.join(kept, Path.basename(path)))
+
+    kept
   end
 end

@@ -1,7 +1,7 @@
 defmodule Soak.Judge do
   @moduledoc """
   Judges a run of `bin/soak` by what was done and by what the nodes' logs tell. Pure. An event is
-  `{microseconds, who, kind, value}`: those of robots as `Soak.Recorder` writes them, those of the run itself by
+  `{microseconds, who, kind, value}`: those of robots as `Soak.Recorder` says it, those of the run itself by
   `:soak`.
 
   | of `:soak` | value |

@@ -1,6 +1,7 @@
 defmodule Soak.Orders do
   @moduledoc "Gives what people would order while a run of `bin/soak` goes on, given on nodes that may be about to end."
-  alias Soak.{Recorder, State}
+  alias Lab.Node.Log
+  alias Soak.State
 
   @order_ms 8_000
   @again_ms 2_000
@@ -8,7 +9,7 @@ defmodule Soak.Orders do
   @doc "Orders what people would order now: a reset until nobody is held, a start where no mission runs."
   @spec due(State.t()) :: State.t()
   def due(%{start_until_us: until, start_next_us: next} = s) do
-    now = Recorder.now()
+    now = Log.now()
 
     cond do
       now < next ->

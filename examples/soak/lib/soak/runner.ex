@@ -3,9 +3,10 @@ defmodule Soak.Runner do
   Carries out a run of `bin/soak`: starts the nodes, does what the schedule says, reads the logs, and asks the
   judge. One process; what could block it (orders to nodes that may be frozen) is done by others.
   """
-  alias Soak.{Deeds, Fleet, Journal, Judge, Logs, Orders, Recorder, Schedule, State}
-  alias Soak.Fleet.{Keeper, Network, Nodes, Processes}
-  alias Soak.WorldHost
+  alias Lab.Fleet.Network
+  alias Lab.Node.Log
+  alias Soak.{Deeds, Fleet, Journal, Judge, Orders, Schedule, State}
+  alias Soak.Fleet.{Nodes, Processes}
 
   @tick_ms 200
   @up_ms 120_000
@@ -49,9 +50,9 @@ defmodule Soak.Runner do
   end
 
   defp start(s) do
-    :ok = Fleet.start(s.fleet)
+    _started = Lab.Node.Fleet.start(s.fleet)
     Process.send_after(self(), :tick, @tick_ms)
-    s = await_up(s, Recorder.now() + @up_ms * 1000)
+    s = await_up(s, Log.now() + @up_ms * 1000)
     if s.signal || s.violations != [], do: s, else: begin(s)
   end
 
@@ -62,7 +63,7 @@ defmodule Soak.Runner do
         {:error, _reason} -> nil
       end
 
-    %{s | begun_us: Recorder.now(), stranger: stranger}
+    %{s | begun_us: Log.now(), stranger: stranger}
   end
 
   defp await_up(s, until) do
@@ -73,7 +74,7 @@ defmodule Soak.Runner do
       map_size(s.vms) == length(s.fleet.robots) + 1 ->
         s
 
-      Recorder.now() > until ->
+      Log.now() > until ->
         State.violation(
           s,
           "not all nodes are up within #{div(@up_ms, 1000)} s: only #{inspect(Map.keys(s.vms))}"
@@ -96,7 +97,8 @@ defmodule Soak.Runner do
   defp heard(s) do
     receive do
       :tick -> tick(s)
-      {Keeper, name, what} -> Nodes.kept(s, name, what)
+      {Vm.Fleet, name, what, us} -> Nodes.kept(s, name, what, us)
+      {:orphans, name, mark} -> Nodes.orphans(s, name, mark)
       {:later, deed} -> Deeds.end_of(s, deed)
       {:said, words} -> State.write(s, words)
       {:udp, _socket, _ip, _port, datagram} -> recorded(s, datagram)
@@ -107,7 +109,7 @@ defmodule Soak.Runner do
 
   defp tick(s) do
     Process.send_after(self(), :tick, @tick_ms)
-    {events, offsets} = Logs.read(s.fleet.folder, s.fleet.robots, s.offsets)
+    {events, offsets} = Log.read(s.fleet.folder, s.fleet.robots, s.offsets)
     s = Enum.reduce(events, %{s | offsets: offsets, ticks: s.ticks + 1}, &State.note(&2, &1))
     s = if s.begun_us, do: s |> due() |> Orders.due() |> State.judge(), else: s
     s = if rem(s.ticks, 5) == 0, do: s |> collisions() |> cpu(), else: s
@@ -122,8 +124,8 @@ defmodule Soak.Runner do
   defp due(s), do: s
 
   defp collisions(s) do
-    with {:ok, at_us, snapshot} <- WorldHost.read(s.fleet.folder),
-         told = WorldHost.collisions(snapshot, s.fleet.world),
+    with {:ok, at_us, snapshot} <- Lab.Node.Fleet.snapshot(s.fleet),
+         told = Fleet.collisions(snapshot, s.fleet.world),
          do: State.note(s, {at_us, :soak, :collisions, told}),
          else: ({:error, _none_yet} -> s)
   end
@@ -139,13 +141,13 @@ defmodule Soak.Runner do
   # Whatever is left is told, and ended.
   defp finish(s) do
     s = cpu(s)
-    Fleet.stop(s.fleet)
+    Vm.Fleet.stop(s.fleet.nodes)
     left = Processes.await_gone(s.mark, @gone_ms)
     words = Enum.map_join(left, ", ", &elem(&1, 1))
     s = if left == [], do: s, else: State.violation(s, "left at the end: #{words}")
     for {pid, _words} <- left, do: Vm.signal(pid, "KILL")
     if s.stranger, do: :gen_udp.close(s.stranger)
-    s = if s.violations == [], do: s, else: %{s | kept: Logs.keep(s.fleet.folder, s.journal_path)}
+    s = if s.violations == [], do: s, else: %{s | kept: Fleet.keep(s.fleet, s.journal_path)}
     Fleet.delete(s.fleet)
     Journal.close(s.journal)
     s

@@ -1,6 +1,7 @@
 defmodule Soak.State do
   @moduledoc "Holds the state of a run of `bin/soak`, and what is noted in it."
-  alias Soak.{Journal, Judge, Recorder}
+  alias Lab.Node.Log
+  alias Soak.{Journal, Judge}
 
   @enforce_keys [:fleet, :journal, :journal_path, :judge, :plan, :duration_ms, :mark, :progress]
   defstruct @enforce_keys ++
@@ -38,7 +39,7 @@ defmodule Soak.State do
   @doc "How long it has run, in milliseconds."
   @spec elapsed_ms(t()) :: non_neg_integer()
   def elapsed_ms(%{begun_us: nil}), do: 0
-  def elapsed_ms(s), do: div(Recorder.now() - s.begun_us, 1000)
+  def elapsed_ms(s), do: div(Log.now() - s.begun_us, 1000)
 
   @doc "Takes an event of the run itself, or of a robot."
   @spec note(t(), Judge.event()) :: t()
@@ -50,7 +51,7 @@ defmodule Soak.State do
   @doc "Lets the judge look at how things stand."
   @spec judge(t()) :: t()
   def judge(s) do
-    {lines, judge} = Judge.judge(s.judge, Recorder.now())
+    {lines, judge} = Judge.judge(s.judge, Log.now())
     Enum.reduce(lines, %{s | judge: judge}, &violation(&2, &1))
   end
 

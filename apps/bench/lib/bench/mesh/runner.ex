@@ -36,14 +36,14 @@ defmodule Bench.Mesh.Runner do
   defp measure(kind, :one, robots, plan) do
     fleet = Nodes.fleet(kind, robots)
     names = for n <- 1..robots, do: Nodes.name(fleet, n)
-    node = Nodes.start(fleet, 0, names, 2)
 
     try do
+      node = Nodes.start(fleet, 0, names, 2)
       s = state(fleet, plan, :one, [node], node, names)
       _at_ns = Nodes.call(node, s.code, :full, [1, names])
       [:ping, :gather, :round, :rate] |> Enum.reduce(%{}, &one(&1, &2, s))
     after
-      Nodes.stop([node])
+      Nodes.stop(fleet)
     end
   end
 
@@ -51,31 +51,26 @@ defmodule Bench.Mesh.Runner do
     fleet = Nodes.fleet(kind, count)
     names = for n <- 1..count, do: Nodes.name(fleet, n)
     plan.note.("#{kind}: #{count} nodes start")
-    nodes = Nodes.start_all(fleet, for(n <- 1..count, do: {n, [Nodes.name(fleet, n)]}))
 
     try do
+      nodes = Nodes.start_all(fleet, for(n <- 1..count, do: {n, [Nodes.name(fleet, n)]}))
       s = state(fleet, plan, count, nodes, nil, names)
       full_ns = full(s, nodes, count)
       began_ns = nodes |> Enum.map(& &1.began_ns) |> Enum.min()
       base = Nodes.start(fleet, 0, [])
+      meet(s, [base], nodes)
+      Nodes.call(base, s.code, :full, [count + 1, names], 60_000)
+      memory = for node <- nodes, do: Vm.resident(node.vm)
+      fixed = %{start: [[(full_ns - began_ns) / 1_000]], memory: [memory]}
 
-      try do
-        meet(s, [base], nodes)
-        Nodes.call(base, s.code, :full, [count + 1, names], 60_000)
-        memory = for node <- nodes, do: Nodes.memory(node)
-        fixed = %{start: [[(full_ns - began_ns) / 1_000]], memory: [memory]}
+      fixed =
+        for {name, values} <- fixed, wanted?(s, name), into: %{}, do: {name, Figures.of(values)}
 
-        fixed =
-          for {name, values} <- fixed, wanted?(s, name), into: %{}, do: {name, Figures.of(values)}
-
-        s = %{s | base: base}
-        figures = Enum.reduce(@talk, fixed, &one(&1, &2, s))
-        dead(s, slow(s, figures))
-      after
-        Nodes.stop([base])
-      end
+      s = %{s | base: base}
+      figures = Enum.reduce(@talk, fixed, &one(&1, &2, s))
+      dead(s, slow(s, figures))
     after
-      Nodes.stop(nodes)
+      Nodes.stop(fleet)
     end
   end
 
@@ -147,8 +142,7 @@ defmodule Bench.Mesh.Runner do
   defp dead(s, figures) do
     if wanted?(s, :kill) or wanted?(s, :cold) do
       {_batches, times} = Mesh.times(:kill, s.size, s.plan.share)
-      {all, s} = Enum.map_reduce(1..times, s, &die/2)
-      Nodes.stop([List.last(s.nodes)])
+      {all, _s} = Enum.map_reduce(1..times, s, &die/2)
       {kills, colds} = Enum.unzip(all)
 
       for {name, values} <- [kill: kills, cold: colds],
@@ -169,19 +163,12 @@ defmodule Bench.Mesh.Runner do
     if s.code == Mesh.Convoy, do: seen(s, :gone)
     watch(s, victim)
     again = Nodes.start(s.fleet, s.size, [victim.name])
-
-    try do
-      meet(s, [again], [s.base])
-      came_ns = seen(s, :join)
-      # If it were killed again before its first datagram came, nobody would miss it.
-      if s.code == Mesh.Convoy, do: seen(s, :up)
-      s = %{s | nodes: List.replace_at(s.nodes, -1, again)}
-      {{(left_ns - killed_ns) / 1_000, (came_ns - again.began_ns) / 1_000}, s}
-    rescue
-      error ->
-        Nodes.stop([again])
-        reraise error, __STACKTRACE__
-    end
+    meet(s, [again], [s.base])
+    came_ns = seen(s, :join)
+    # If it were killed again before its first datagram came, nobody would miss it.
+    if s.code == Mesh.Convoy, do: seen(s, :up)
+    s = %{s | nodes: List.replace_at(s.nodes, -1, again)}
+    {{(left_ns - killed_ns) / 1_000, (came_ns - again.began_ns) / 1_000}, s}
   end
 
   # Bare OTP notices a freeze only because its nodes are started with a short tick. That takes

@@ -9,102 +9,76 @@ defmodule Lab.Fleet.Nodes do
   when it ends for the sixth time, so does the run.
   """
   @behaviour Lab.Fleet.Backend
-  alias Lab.Fleet.Nodes
-  alias Lab.Fleet.Hardware
-  alias Lab.Fleet.Nodes.{Child, Command, Host}
+  alias Lab.Fleet.{Hardware, Network}
+  alias Lab.Fleet.Nodes.{Command, Host}
   alias Sim.World
   alias Sim.World.Snapshot
   alias Lab.Node.Reporter
+  alias Vm.Fleet
 
   # On a busy machine a start takes several seconds.
   @up_ms 20_000
   @silent_ms 1_000
   @world_starts 5
 
-  @enforce_keys [:setup, :host, :name, :world]
-  defstruct @enforce_keys ++ [children: %{}, reports: %{}, world_starts: 0]
+  @enforce_keys [:setup, :host, :nodes, :name, :world]
+  defstruct @enforce_keys ++ [dead: [], server: nil, reports: %{}, world_starts: 0]
 
-  @typedoc """
-  `children` by robot id and `:world`; `reports` hold claim, counts, and the time of arrival.
-  """
+  @typedoc "`dead` are robots; `server` is that of the world; `reports` hold claim, counts, and the time of arrival."
   @type t :: %__MODULE__{}
 
   @impl Lab.Fleet.Backend
   def start(setup, _options) do
     ids = [:world | setup.options.robots]
 
-    with {:ok, host} <- Host.start(setup.options.robots, Enum.map(ids, &node_name/1)) do
+    with {:ok, host} <- Host.start(setup.options.robots, [:world]) do
       name = {:world, System.pid(), System.unique_integer()}
-      backend = %__MODULE__{setup: setup, host: host, name: name, world: setup.world}
+      nodes = Fleet.new(tell: self())
+      own = [setup: setup, host: host, nodes: nodes, name: name, world: setup.world]
+      backend = struct!(__MODULE__, own)
+      Fleet.start(nodes, Enum.map(ids, &about(backend, &1)))
 
-      with {:ok, backend} <- launch(backend, ids), {:ok, backend} <- await_all(backend, ids) do
-        {:ok, backend}
+      with line when line != nil <- Enum.find_value(ids, &fallen(backend, &1)) do
+        stop(backend)
+        {:error, line}
       else
-        {:error, line, backend} ->
-          stop(backend)
-          {:error, line}
+        nil -> {:ok, %{backend | server: Fleet.await(nodes).world}}
       end
     end
   end
 
-  defp launch(backend, ids) do
-    Enum.reduce_while(ids, {:ok, backend}, fn id, {:ok, backend} ->
-      case Child.start(config(backend, id), backend.host.home) do
-        {:ok, child} -> {:cont, {:ok, put_in(backend.children[id], child)}}
-        {:error, line} -> {:halt, {:error, line, backend}}
-      end
-    end)
-  end
+  defp fallen(backend, id) do
+    case Fleet.outcome(backend.nodes, id) do
+      {:ok, _facts} ->
+        nil
 
-  # As long as nodes come up one after the other, the machine is only slow.
-  defp await_all(backend, ids, deadline \\ Hal.Clock.now_ms() + @up_ms) do
-    case Enum.filter(ids, &(backend.children[&1].up == nil)) do
-      [] ->
-        {:ok, backend}
+      {:error, {:timeout, _call}} ->
+        late(backend, id)
 
-      missing ->
-        receive do
-          {Reporter, _pid, {:up, _facts}} = message ->
-            backend |> told(message) |> await_all(missing)
+      {:error, {:no_vm, _reason}} ->
+        "#{node_name(backend, id)} cannot start: is there a node of this name already?"
 
-          {Reporter, _pid, _what} = message ->
-            backend |> told(message) |> await_all(missing, deadline)
-
-          {port, {:data, _text}} = message when is_port(port) ->
-            backend |> told(message) |> await_all(missing, deadline)
-
-          {port, {:exit_status, _status}} when is_port(port) ->
-            {:error, fallen(backend, port), backend}
-        after
-          max(deadline - Hal.Clock.now_ms(), 0) -> {:error, late(backend, hd(missing)), backend}
-        end
+      {:error, reason} ->
+        why = inspect(reason, limit: 10, printable_limit: 100)
+        "#{node_name(backend, id)} ended at its start: #{why}"
     end
   end
 
-  defp told(backend, message) do
-    {:ok, _events, backend} = hear(backend, message)
-    backend
-  end
-
-  defp fallen(backend, port) do
-    {_id, child} = Enum.find(backend.children, fn {_id, child} -> child.port == port end)
-    "#{child.node} ended at its start: #{Child.last_line(child)}"
-  end
-
-  defp late(backend, id) do
-    child = backend.children[id]
-    "#{child.node} did not come up within #{div(@up_ms, 1000)} s: #{Child.last_line(child)}"
-  end
+  defp late(backend, id),
+    do: "#{node_name(backend, id)} did not come up within #{div(@up_ms, 1000)} s"
 
   @impl Lab.Fleet.Backend
   def begin(backend) do
-    for id <- living(backend), do: send(backend.children[id].up.main, :begin)
+    # One that cannot arm says why in its status.
+    for id <- living(backend),
+        vm = Fleet.vm(backend.nodes, id),
+        do: Vm.cast(vm, Lab.Fleet.Robot, :begin, [id])
+
     :ok
   end
 
   @impl Lab.Fleet.Backend
-  def living(backend),
-    do: Enum.filter(backend.setup.options.robots, &is_map_key(backend.children, &1))
+  def living(backend), do: backend.setup.options.robots -- backend.dead
 
   @impl Lab.Fleet.Backend
   def claims(backend) do
@@ -120,24 +94,19 @@ defmodule Lab.Fleet.Nodes do
 
   @impl Lab.Fleet.Backend
   def kill(backend, id) do
-    {child, children} = Map.pop!(backend.children, id)
-    Child.kill(child)
-    change(%{backend | children: children}, {:kill, id})
+    Fleet.kill(backend.nodes, id)
+    wreck(backend, id)
   end
 
   # Also to our own copy, from which a server that is down or about to crash starts again.
   @impl Lab.Fleet.Backend
   def change(backend, change) do
-    if pid = server(backend), do: World.Server.change(pid, change)
+    if pid = backend.server, do: World.Server.change(pid, change)
     %{backend | world: World.Server.changed(backend.world, change)}
   end
 
   @impl Lab.Fleet.Backend
   def world(backend), do: backend.world
-
-  # None while the world is started again.
-  defp server(%{children: %{world: %{up: %{server: server}}}}), do: server
-  defp server(_down), do: nil
 
   @impl Lab.Fleet.Backend
   def messages(backend) do
@@ -149,76 +118,50 @@ defmodule Lab.Fleet.Nodes do
   @impl Lab.Fleet.Backend
   def lines(backend) do
     for id <- backend.setup.options.robots ++ [:world] do
-      child = backend.children[id]
-      {id, node_name(id), child && child.pid}
+      vm = if id in backend.dead, do: nil, else: Fleet.vm(backend.nodes, id)
+      {id, node_name(backend, id), vm && vm.pid}
     end
     |> Command.lines(backend.host.home)
     |> Kernel.++(Hardware.lines(backend.setup.robots, backend.host.home))
   end
 
   @impl Lab.Fleet.Backend
-  def hear(backend, {Reporter, pid, what}) do
-    case Enum.find(backend.children, fn {_id, child} -> child.pid == pid end) do
-      {id, _child} -> heard(backend, id, what)
-      nil -> {:ok, [], backend}
-    end
+  def hear(backend, {Reporter, :world, {:report, snapshot}}),
+    do: {:ok, [], %{backend | world: Snapshot.onto(backend.setup.world, snapshot)}}
+
+  def hear(backend, {Reporter, id, {:report, {claim, counts}}}),
+    do: {:ok, [], put_in(backend.reports[id], {claim, counts, Hal.Clock.now_ms()})}
+
+  def hear(backend, {Reporter, id, {:stage, %{robot: id, stage: stage} = about}}) do
+    {:ok, [{:stage, stage, id, Map.drop(about, [:robot, :stage])}], begun(backend, id, stage)}
   end
 
-  def hear(backend, {port, {:data, text}}) when is_port(port),
-    do:
-      {:ok, [],
-       with_child(backend, port, fn backend, id ->
-         update_in(backend.children[id], &Child.said(&1, text))
-       end)}
+  def hear(%{world_starts: starts} = backend, {Fleet, :world, {:up, _vm, server}, _us})
+      when starts > 0,
+      do: {:ok, [{:stage, :world_back, nil, %{}}], %{backend | server: server}}
 
-  def hear(backend, {port, {:exit_status, _status}}) when is_port(port) do
-    case Enum.find(backend.children, fn {_id, child} -> child.port == port end) do
-      {:world, child} -> world_again(backend, child)
-      {id, _child} -> {:ok, [{:killed, id}], wreck(backend, id)}
-      nil -> {:ok, [], backend}
-    end
+  # None while the world is started again.
+  def hear(backend, {Fleet, :world, {:down, words, _life}, _us}),
+    do: world_again(%{backend | server: nil}, words)
+
+  def hear(backend, {Fleet, id, {:down, _words, _life}, _us}) do
+    if id in backend.dead,
+      do: {:ok, [], backend},
+      else: {:ok, [{:killed, id}], wreck(backend, id)}
   end
 
-  def hear(backend, {:late, :world, pid}) do
-    case backend.children[:world] do
-      %{pid: ^pid, up: nil} = child ->
-        Child.kill(child)
-        ended(backend, late(backend, :world))
-
-      _up ->
-        {:ok, [], backend}
-    end
+  def hear(%{world_starts: start, server: nil} = backend, {:late, start}) do
+    Fleet.kill(backend.nodes, :world)
+    {:ended, late(backend, :world), backend}
   end
 
   def hear(backend, _other), do: {:ok, [], backend}
 
   @impl Lab.Fleet.Backend
   def stop(backend) do
-    children = Map.values(backend.children)
-    Enum.each(children, &Child.kill/1)
-    Child.await_ends(children)
+    Fleet.stop(backend.nodes)
     Host.stop(backend.host)
   end
-
-  defp heard(backend, :world, {:up, facts}) do
-    backend = put_in(backend.children[:world].up, facts)
-    events = if backend.world_starts > 0, do: [{:stage, :world_back, nil, %{}}], else: []
-    {:ok, events, backend}
-  end
-
-  defp heard(backend, id, {:up, facts}), do: {:ok, [], put_in(backend.children[id].up, facts)}
-
-  defp heard(backend, :world, {:report, snapshot}),
-    do: {:ok, [], %{backend | world: Snapshot.onto(backend.setup.world, snapshot)}}
-
-  defp heard(backend, id, {:report, {claim, counts}}),
-    do: {:ok, [], put_in(backend.reports[id], {claim, counts, Hal.Clock.now_ms()})}
-
-  defp heard(backend, id, {:stage, %{robot: id, stage: stage} = about}) do
-    {:ok, [{:stage, stage, id, Map.drop(about, [:robot, :stage])}], begun(backend, id, stage)}
-  end
-
-  defp heard(backend, _id, _unknown), do: {:ok, [], backend}
 
   # Its next report will say so; until then the run log must not consider the search finished.
   defp begun(backend, id, :search) do
@@ -229,46 +172,33 @@ defmodule Lab.Fleet.Nodes do
   defp begun(backend, _id, _stage), do: backend
 
   defp wreck(backend, id),
-    do: change(%{backend | children: Map.delete(backend.children, id)}, {:kill, id})
+    do: change(%{backend | dead: [id | backend.dead]}, {:kill, id})
 
-  defp world_again(%{world_starts: @world_starts} = backend, child) do
-    line = "#{child.node} has ended #{@world_starts + 1} times, last: #{Child.last_line(child)}"
-    ended(backend, line)
+  defp world_again(%{world_starts: @world_starts} = backend, words) do
+    times = "has ended #{@world_starts + 1} times, last: #{words}"
+    {:ended, "#{node_name(backend, :world)} #{times}", backend}
   end
 
-  defp world_again(backend, _child) do
+  defp world_again(backend, _words) do
     backend = %{backend | world_starts: backend.world_starts + 1}
-
-    case launch(backend, [:world]) do
-      {:ok, backend} ->
-        Process.send_after(self(), {:late, :world, backend.children.world.pid}, @up_ms)
-        {:ok, [{:stage, :world_lost, nil, %{}}], backend}
-
-      {:error, line, backend} ->
-        ended(backend, line)
-    end
+    Fleet.revive(backend.nodes, :world, about(backend, :world).main)
+    Process.send_after(self(), {:late, backend.world_starts}, @up_ms)
+    {:ok, [{:stage, :world_lost, nil, %{}}], backend}
   end
 
-  defp ended(backend, line),
-    do: {:ended, line, %{backend | children: Map.delete(backend.children, :world)}}
+  defp node_name(backend, id), do: Network.node_name(backend.host.network, id)
 
-  defp with_child(backend, port, change) do
-    case Enum.find(backend.children, fn {_id, child} -> child.port == port end) do
-      {id, _child} -> change.(backend, id)
-      nil -> backend
-    end
+  defp about(%{host: %{network: network, home: home}} = backend, id) do
+    swarm = [
+      mesh: Host.mesh(network, id),
+      formations: Application.get_env(:swarm, :formations, [])
+    ]
+
+    arguments = [part(backend, id), [logger: [level: :error], swarm: swarm], [to: {self(), id}]]
+    options = Network.vm(network, id) ++ [env: [{"HOME", home}]]
+    # By its name: here no robot's module is called.
+    %{name: id, vm: options, main: &Vm.call(&1, Lab.Node, :main, arguments, @up_ms)}
   end
-
-  defp config(backend, id) do
-    %Nodes.Config{
-      node: node_name(id),
-      launcher: self(),
-      mesh: Host.mesh(backend.host, node_name(id)),
-      part: part(backend, id)
-    }
-  end
-
-  defp node_name(id), do: Command.node_name(id, Host.host())
 
   defp part(backend, :world), do: {Lab.Node.World, %{name: backend.name, world: backend.world}}
 

@@ -28,10 +28,11 @@ defmodule Lab.Fleet.Robot do
         }
 
   @doc "Starts a robot of `Lab.Trial.Setup` in a `Robot.Fleet`."
-  @spec start(Supervisor.supervisor(), Lab.Trial.Setup.robot(), common()) :: {:ok, pid()}
-  def start(fleet, robot, common) do
+  @spec start(Supervisor.supervisor(), Lab.Trial.Setup.robot(), common(), restart) :: {:ok, pid()}
+        when restart: :temporary | :permanent
+  def start(fleet, robot, common, restart \\ :temporary) do
     config = Swarm.Comms.join(config(robot, common), transport: common.transport)
-    {:ok, _pid} = Robot.Fleet.start_robot(fleet, config)
+    {:ok, _pid} = Robot.Fleet.start_robot(fleet, config, restart)
   end
 
   @doc "A clock for robots: milliseconds since this call."

@@ -4,31 +4,29 @@ defmodule Lab.Node.Reporter do
   # robot of this node. If the launcher cannot be reached at once, the report is dropped: the next
   # one is newer.
   #
-  # It sends messages `{Lab.Node.Reporter, pid, what}` with the number of this process of the
-  # operating system, where `what` is `{:up, facts}`, `{:report, term}` or `{:stage, about}`.
+  # It sends messages `{Lab.Node.Reporter, name, what}`, where `what` is `{:report, term}` or `{:stage, about}`. If there
+  # is a file instead of a launcher, the newest report is in it, `{at_us, term}` by the machine's time, whole or not at all.
   use GenServer
   alias Hal.{Event, Ticker}
 
   @period_ms 100
 
   @doc "Starts the reporter; `report` is `{m, f, a}`, called for each report."
-  @spec start_link(pid(), {module(), atom(), list()}) :: GenServer.on_start()
+  @spec start_link({pid(), name :: atom()} | Path.t(), {module(), atom(), list()}) ::
+          GenServer.on_start()
   def start_link(launcher, report), do: GenServer.start_link(__MODULE__, {launcher, report})
 
-  @doc "Sends the launcher something once, and retries until the launcher can be reached."
-  @spec tell(pid(), term()) :: :ok
-  def tell(reporter, what), do: GenServer.cast(reporter, {:tell, what})
-
+  # Sent once, and again until the launcher can be reached.
   @doc false
   @spec stage(Event.name(), map(), map(), pid()) :: :ok
-  def stage(_event, _measurements, about, reporter), do: tell(reporter, {:stage, about})
+  def stage(_event, _measurements, about, reporter),
+    do: GenServer.cast(reporter, {:tell, {:stage, about}})
 
   @impl GenServer
   def init({launcher, report}) do
     :ok = Event.attach(__MODULE__, [:robot, :stage], &__MODULE__.stage/4, self())
-    me = System.pid() |> String.to_integer()
     ticker = Ticker.start(:report, @period_ms, @period_ms)
-    {:ok, %{launcher: launcher, report: report, me: me, waiting: [], ticker: ticker}}
+    {:ok, %{launcher: launcher, report: report, waiting: [], ticker: ticker}}
   end
 
   @impl GenServer
@@ -52,9 +50,16 @@ defmodule Lab.Node.Reporter do
     end
   end
 
-  defp post(%{launcher: launcher} = s, what) do
+  defp post(%{launcher: path}, {:report, term}) when is_binary(path) do
+    File.write!(path <> ".new", :erlang.term_to_binary({:os.perf_counter(:microsecond), term}))
+    File.rename!(path <> ".new", path)
+  end
+
+  defp post(%{launcher: path}, _stage) when is_binary(path), do: :ok
+
+  defp post(%{launcher: {launcher, name}}, what) do
     if node(launcher) in Node.list(),
-      do: :erlang.send(launcher, {__MODULE__, s.me, what}, [:nosuspend, :noconnect]),
+      do: :erlang.send(launcher, {__MODULE__, name, what}, [:nosuspend, :noconnect]),
       else: :noconnect
   end
 

@@ -4,27 +4,35 @@ defmodule Lab.Node.Robot do
 
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
       |-- Sim.World.Directory     where the world is
+      |-- Sim.World.Line          the way to a world that is on no node of the same network
       |-- Lab.Fleet.RadioServer  a radio that loses, duplicates and delays messages, if any is to
       |-- Lab.Fleet.Hardware  emulated devices, if it has the real drivers
-      `-- Robot.Fleet    the robot
+      `-- supervisor (one_for_one)  what else the fleet wants to run beside the robot
 
   Options: `robot` as in `Lab.Trial.Setup`, `world`, `blobs`, `mission`, `plan`, `folder` as in
-  `Lab.Fleet.Robot`, `radio` as `Lab.Fleet.RadioServer.parts/2` takes it.
+  `Lab.Fleet.Robot`, `radio` as `Lab.Fleet.RadioServer.parts/2` takes it; `line`, the path of `Sim.World.Line`;
+  `beside`, more children; `restart: :permanent` for a robot that is started again for ever, as in a release.
   """
   @behaviour Lab.Node
+  alias Robot.Departure.Note
   alias Lab.Fleet.{Hardware, RadioServer, Robot}
   alias Sim.World
 
   @impl Lab.Node
   def start(options) do
+    id = options.robot.id
+    options = Map.merge(%{line: nil, beside: [], restart: :temporary, plan: nil}, options)
+    options = Map.put_new(options, :radio, %{seed: 0})
+
     children =
       [World.Directory] ++
+        if(options.line, do: [World.Line.robot(options.line, options.world)], else: []) ++
         RadioServer.parts(options.radio) ++
-        Hardware.parts([options.robot], options.world, options.folder) ++ [Elixir.Robot.Fleet]
+        Hardware.parts([options.robot], options.world, options.folder) ++ beside(options.beside)
 
     {:ok, supervisor} = Supervisor.start_link(children, strategy: :one_for_all, max_restarts: 0)
-    part = fn id -> for {^id, pid, _, _} <- Supervisor.which_children(supervisor), do: pid end
-    {transport, air} = RadioServer.radio(List.first(part.(RadioServer)))
+    airs = for {RadioServer, pid, _, _} <- Supervisor.which_children(supervisor), do: pid
+    {transport, air} = RadioServer.radio(List.first(airs))
 
     common = %{
       world: options.world,
@@ -38,16 +46,21 @@ defmodule Lab.Node.Robot do
       folder: options.folder
     }
 
-    {:ok, pid} = Robot.start(hd(part.(Elixir.Robot.Fleet)), options.robot, common)
-    Process.link(pid)
-    {:ok, pid, %{}, {__MODULE__, :report, [options.robot.id, air]}}
+    # Whatever starts the node says where the robot stands.
+    if options.robot.hardware?,
+      do: Note.delete(Hardware.drivers(options.robot, options.folder)[:departure_file])
+
+    {:ok, pid} = Robot.start(Elixir.Robot.Fleet, options.robot, common, options.restart)
+    if options.restart == :temporary, do: Process.link(pid)
+    {:ok, nil, {__MODULE__, :report, [id, air]}}
   end
 
-  @impl Lab.Node
-  def begin(options) do
-    # One that cannot arm says why in its status.
-    _started = Robot.begin(options.robot.id)
-    :ok
+  # Some crash beside a robot whose processes are killed.
+  defp beside([]), do: []
+
+  defp beside(children) do
+    start = {Supervisor, :start_link, [children, [strategy: :one_for_one, max_restarts: 1_000]]}
+    [%{id: :beside, type: :supervisor, start: start}]
   end
 
   @doc "What the robot claims about itself, and how many messages it sent."

@@ -6,6 +6,7 @@ defmodule Sim.World.Snapshot do
   A world that is started from a snapshot goes on where it was; only the sonars are fired again by
   its first step.
   """
+  alias Hal.Pose
   alias Sim.World
   alias Sim.World.Body
 
@@ -30,6 +31,17 @@ defmodule Sim.World.Snapshot do
       end
 
     changed(%{begun | robots: robots}, @moving, world)
+  end
+
+  @doc """
+  Where the wheels of a robot would have begun to count, by where its body was then: what a person tells a robot
+  that is switched on again. With `:zero` its wheels count from nothing, as those of a real base do.
+  """
+  @spec start(t(), World.t(), atom(), :zero | :on) :: Pose.t()
+  def start(snapshot, begun, robot, wheels) do
+    %{pose: pose, odometry: odometry} = onto(begun, snapshot).robots[robot]
+    zero = Pose.new(0.0, 0.0)
+    if wheels == :zero, do: pose, else: Pose.compose(pose, Pose.relative(odometry, zero))
   end
 
   defp values(struct, keys), do: Enum.map(keys, &Map.fetch!(struct, &1))

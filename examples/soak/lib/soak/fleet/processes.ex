@@ -1,7 +1,7 @@
 defmodule Soak.Fleet.Processes do
   @moduledoc "Looks at processes of the operating system, where there is /proc; elsewhere it finds none."
 
-  @doc "Those with this mark in their environment, as `{number, line}`: by `CONVOY_SOAK`, the whole value or its beginning."
+  @doc "Those with this mark in their environment, as `{number, line}`: by `VM_FLEET`, the whole value or its beginning."
   @spec marked(String.t()) :: [{pid :: String.t(), line :: String.t()}]
   def marked(mark) do
     with {:ok, names} <- File.ls("/proc") do
@@ -31,7 +31,7 @@ defmodule Soak.Fleet.Processes do
   end
 
   defp marked?(environment, mark) do
-    prefix = "CONVOY_SOAK=#{mark}"
+    prefix = "VM_FLEET=#{mark}"
 
     environment
     |> String.split(<<0>>)
@@ -42,17 +42,6 @@ defmodule Soak.Fleet.Processes do
     case File.read("/proc/#{pid}/cmdline") do
       {:ok, line} -> line |> String.replace(<<0>>, " ") |> String.slice(0, 80)
       {:error, _gone} -> "has ended"
-    end
-  end
-
-  @doc "The resident set of a process in bytes, 0 where it is not known."
-  @spec resident(String.t()) :: non_neg_integer()
-  def resident(pid) do
-    with {:ok, text} <- File.read("/proc/#{pid}/status"),
-         [_line, kilobytes] <- Regex.run(~r/VmRSS:\s+(\d+)/, text) do
-      1024 * String.to_integer(kilobytes)
-    else
-      _unknown -> 0
     end
   end
 

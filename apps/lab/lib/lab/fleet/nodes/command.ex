@@ -1,46 +1,18 @@
 defmodule Lab.Fleet.Nodes.Command do
   @moduledoc false
-  # Writes the commands that start a node, and those by which a person reaches it, as text. Pure.
-
-  @doc """
-  The arguments of `erl` for a node, with the carrier of robots (`Mesh.Distribution.Access`) and the formations that
-  this build adds.
-
-      iex> Lab.Fleet.Nodes.Command.arguments([]) |> Enum.take(-3)
-      ["-s", "Elixir.Lab.Node", "main"]
-      iex> Lab.Fleet.Nodes.Command.arguments(echelon: Mine.Echelon) |> Enum.take(-6)
-      ["-swarm", "formations", "[{echelon,'Elixir.Mine.Echelon'}]", "-s", "Elixir.Lab.Node", "main"]
-  """
-  @spec arguments([{atom(), module()}]) :: [String.t()]
-  def arguments(formations),
-    do:
-      ["-noshell" | Vm.fleet_flags()] ++
-        ["-proto_dist", "Elixir.Mesh.Distribution.Tcp"] ++
-        formations(formations) ++ ["-s", "Elixir.Lab.Node", "main"]
-
-  defp formations([]), do: []
-  defp formations(added), do: ["-swarm", "formations", to_string(:io_lib.format("~0p", [added]))]
-
-  @doc """
-  The name of a node.
-
-      iex> Lab.Fleet.Nodes.Command.node_name(:mag1, "127.0.0.1")
-      :"mag1@127.0.0.1"
-  """
-  @spec node_name(atom(), String.t()) :: node()
-  def node_name(id, host), do: :"#{id}@#{host}"
+  # Writes the commands by which a person reaches a fleet's nodes, as text. Pure.
 
   @doc """
   The lines that tell people how to reach a fleet's processes.
 
       iex> [first, _world, attach | _] =
-      ...>   Lab.Fleet.Nodes.Command.lines([{:mag1, :"mag1@127.0.0.1", 71}, {:world, :"world@127.0.0.1", 70}], "/tmp/x")
+      ...>   Lab.Fleet.Nodes.Command.lines([{:mag1, :"mag1@127.0.0.1", "71"}, {:world, :"world@127.0.0.1", "70"}], "/tmp/x")
       iex> first
       "mag1 pid 71 node mag1@127.0.0.1"
       iex> attach
       "attach:   HOME=/tmp/x iex --hidden --name me$$@127.0.0.1 --remsh mag1@127.0.0.1"
   """
-  @spec lines([{atom(), node(), pid :: pos_integer() | nil}], Path.t()) :: [String.t()]
+  @spec lines([{atom(), node(), pid :: String.t() | nil}], Path.t()) :: [String.t()]
   def lines(nodes, home) do
     width =
       nodes |> Enum.map(fn {id, _, _} -> String.length("#{id}") end) |> Enum.max(fn -> 0 end)

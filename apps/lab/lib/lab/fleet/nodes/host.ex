@@ -3,82 +3,49 @@ defmodule Lab.Fleet.Nodes.Host do
   # Makes this process of the operating system the node that starts others, on the loopback
   # interface, with a mesh of its own through which it hears them.
   #
-  # The secret of a run is random and in no file. Nodes get it on their standard input; for people
+  # The secret of a run is random and in no file. Nodes get it over their standard input; for people
   # who want to attach, its cookie is in a folder that only this user can read, and that goes with
   # the run however it ends (`Lab.Fleet.Folder`). So it is neither on a command line nor in an
   # environment.
-  alias Lab.Fleet.Folder
+  alias Lab.Fleet.{Folder, Network}
   alias Lab.Fleet.Nodes.PortMapper
-  alias Mesh.{Options, Secret}
+  alias Mesh.Options
 
-  @host "127.0.0.1"
   @address {127, 0, 0, 1}
   @name :"demo@127.0.0.1"
 
-  @enforce_keys [:home, :secret, :ports, :fleet, :mesh, :named]
+  @enforce_keys [:home, :network, :mesh, :named]
   defstruct @enforce_keys
 
   @type t :: %__MODULE__{
           home: Path.t(),
-          secret: Secret.t(),
-          ports: %{node() => :inet.port_number()},
-          fleet: [atom()],
-          mesh: pid() | nil,
+          network: Network.t(),
+          mesh: pid(),
           named: {:by_us, PortMapper.t()} | :before
         }
 
-  @doc "The host part of all nodes' names."
-  @spec host() :: String.t()
-  def host, do: @host
-
-  @doc "Makes this process a node with a mesh, for a fleet of these robots in those nodes."
-  @spec start([atom()], [node()]) :: {:ok, t()} | {:error, line :: String.t()}
-  def start(fleet, nodes) do
+  @doc "Makes this process a node with a mesh, for a fleet of these robots and of nodes that are none."
+  @spec start([atom()], [atom()]) :: {:ok, t()} | {:error, line :: String.t()}
+  def start(robots, others) do
     with :ok <- alone(),
+         {:ok, network} <- Network.create(:epmd, robots, [:launcher | others]),
          {:ok, home} <- Folder.make(),
-         secret = Secret.random(),
-         :ok <- cookie(home, secret),
+         :ok <- cookie(home, network.secret),
          {:ok, named} <- become_node() do
-      with {:error, line} <- meshed(home, secret, fleet, nodes, named) do
-        unname(named)
-        {:error, line}
+      with {:ok, options} <- Options.prepare(mesh(network, :launcher)),
+           {:ok, mesh} <- Mesh.Supervisor.start_link({options, Swarm.MeshConsumer}) do
+        {:ok, %__MODULE__{home: home, network: network, mesh: mesh, named: named}}
+      else
+        {:error, line} ->
+          unname(named)
+          {:error, line}
       end
     end
   end
 
-  defp meshed(home, secret, fleet, nodes, named) do
-    with {:ok, ports} <- ports([node() | nodes]),
-         host = %__MODULE__{
-           home: home,
-           secret: secret,
-           ports: ports,
-           fleet: fleet,
-           mesh: nil,
-           named: named
-         },
-         {:ok, options} <- Options.prepare(mesh(host, node())),
-         {:ok, mesh} <- Mesh.Supervisor.start_link({options, Swarm.MeshConsumer}),
-         do: {:ok, %{host | mesh: mesh}}
-  end
-
-  @doc """
-  The options of a node's mesh. The ports are known, so multicast, which not every machine has on
-  loopback, is not needed. All nodes are connected to all, because the world is one of them.
-  """
-  @spec mesh(t(), node()) :: keyword()
-  def mesh(host, node) do
-    {port, others} = Map.pop!(host.ports, node)
-
-    [
-      secret: host.secret,
-      fleet: host.fleet,
-      interface: @address,
-      port: port,
-      multicast: false,
-      peers: for({_node, port} <- Enum.sort(others), do: {@address, port}),
-      full_mesh: 1_000
-    ]
-  end
+  @doc "The options of a node's mesh. All nodes are connected to all, because the world is one of them."
+  @spec mesh(Network.t(), atom()) :: keyword()
+  def mesh(network, name), do: Network.mesh(network, name) ++ [full_mesh: 1_000]
 
   @doc """
   Ends the mesh, removes the run's folder, and gives up the node's name if it got that here.
@@ -133,20 +100,6 @@ defmodule Lab.Fleet.Nodes.Host do
     result = function.()
     :logger.set_primary_config(:level, level)
     result
-  end
-
-  # All are open at the same time, so that no two are equal.
-  defp ports(nodes) do
-    opened = for node <- nodes, do: {node, :gen_udp.open(0, ip: @address)}
-
-    ports =
-      for {node, {:ok, socket}} <- opened, {:ok, port} <- [:inet.port(socket)], do: {node, port}
-
-    for {_node, {:ok, socket}} <- opened, do: :gen_udp.close(socket)
-
-    if length(ports) == length(nodes),
-      do: {:ok, Map.new(ports)},
-      else: {:error, "no UDP port is free on #{@host} for each of #{length(nodes)} nodes"}
   end
 
   # The folder is this user's alone before there is anything in it.

@@ -1,6 +1,6 @@
-defmodule Soak.WorldHostTest do
+defmodule Soak.FleetTest do
   use ExUnit.Case, async: true
-  alias Soak.WorldHost
+  alias Soak.Fleet
   alias Hal.{Pose, Twist}
   alias Lab.Trial.Setup
   alias Sim.World
@@ -16,10 +16,10 @@ defmodule Soak.WorldHostTest do
     %{pose: pose, odometry: odometry} = driven.robots.mag1
     assert Pose.distance(pose, Pose.new(-1.7, 0.5)) > 0.3
 
-    assert WorldHost.start(snapshot, begun, :mag1, :zero) == pose
-    known = Pose.compose(WorldHost.start(snapshot, begun, :mag1, :on), odometry)
+    assert Snapshot.start(snapshot, begun, :mag1, :zero) == pose
+    known = Pose.compose(Snapshot.start(snapshot, begun, :mag1, :on), odometry)
     assert Pose.distance(known, pose) < 1.0e-9
     assert abs(Pose.wrap(known.heading - pose.heading)) < 1.0e-9
-    assert WorldHost.collisions(snapshot, begun) == {0, []}
+    assert Fleet.collisions(snapshot, begun) == {0, []}
   end
 end
