@@ -24,7 +24,7 @@ defmodule System.NetnsCardsTest do
   alias Mesh.Distribution.Epmd
   alias Swarm.EStop.Broadcaster
   alias Netns.Stopped
-  alias Lab.Fleet.Network
+  alias Lab.Node.Network
   alias Vm.{Fleet, Net}
   @moduletag :realtime
   @moduletag skip: why_not

@@ -19,7 +19,7 @@ defmodule Lab do
 
       Lab.Fleet
       |-- Sim.World.Server       the only truth: bodies, walls, landmark
-      |-- Lab.Fleet.RadioServer  who hears whom
+      |-- Lab.RadioServer  who hears whom
       `-- Robot.Fleet            a Robot.Supervisor for each robot, with simulated drivers
 
   Bodies, walls, sonars, cameras and radio are those of `Sim`, which knows no robot. Go on with `Lab.Trial` and `docs/scenarios.md`.

@@ -1,7 +1,8 @@
 defmodule Lab.NodesTest do
   @moduledoc "The pure parts of fleets whose robots are processes of their own."
   use ExUnit.Case, async: true
-  alias Lab.Fleet.{Network, Nodes}
+  alias Lab.Fleet.Nodes
+  alias Lab.Node.Network
   alias Lab.Fleet.Nodes.{Command, Host}
   doctest Lab.Fleet.Nodes.Command
 

@@ -45,7 +45,7 @@ defmodule Soak.Recorder do
 
   @doc false
   @spec claim(atom()) :: term()
-  def claim(robot), do: robot |> Lab.Fleet.Robot.claim() |> Map.take([:phase, :leader, :epoch])
+  def claim(robot), do: robot |> Lab.VirtualRobot.claim() |> Map.take([:phase, :leader, :epoch])
 
   @doc false
   @spec held(atom()) :: term()

@@ -3,7 +3,7 @@ defmodule Soak.Runner do
   Carries out a run of `bin/soak`: starts the nodes, does what the schedule says, reads the logs, and asks the
   judge. One process; what could block it (orders to nodes that may be frozen) is done by others.
   """
-  alias Lab.Fleet.Network
+  alias Lab.Node.Network
   alias Lab.Node.Log
   alias Soak.{Deeds, Fleet, Journal, Judge, Orders, Schedule, State}
   alias Soak.Fleet.{Nodes, Processes}

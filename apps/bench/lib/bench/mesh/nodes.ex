@@ -2,7 +2,7 @@ defmodule Bench.Mesh.Nodes do
   @moduledoc false
   # Starts the nodes to measure (`Vm.Fleet`): this process is not part of the measurement.
   alias Bench.Mesh.{Bare, Convoy, Watch}
-  alias Lab.Fleet.Network
+  alias Lab.Node.Network
   alias Vm.Fleet
 
   @enforce_keys [:name, :node, :vm, :began_ns]

@@ -5,14 +5,17 @@ defmodule Lab.Fleet.Local do
       supervisor (one_for_all, no restarts: a fleet cannot exist without its world)
       |-- Sim.World.Directory     unless another fleet of this node has it already
       |-- Sim.World.Server     the world
-      |-- Lab.Fleet.RadioServer  a radio that loses, duplicates and delays messages, if any is to
-      |-- Lab.Fleet.Hardware  emulated devices of those that have the real drivers, if any has
+      |-- Lab.RadioServer  a radio that loses, duplicates and delays messages, if any is to
+      |-- Lab.VirtualRobot.Hardware  emulated devices of those that have the real drivers, if any has
       `-- Robot.Fleet    the robots, each :temporary: one that ends for good is a wreck
   """
   @behaviour Lab.Fleet.Backend
-  alias Elixir.Robot.Names
+  alias Robot.Names
   alias Hal.Event
-  alias Lab.Fleet.{Folder, Hardware, RadioServer, Robot}
+  alias Lab.Fleet.Folder
+  alias Lab.VirtualRobot
+  alias Lab.VirtualRobot.Hardware
+  alias Lab.RadioServer
   alias Sim.World
 
   @enforce_keys [:supervisor, :server, :air, :order, :pids, :robots, :folder]
@@ -37,7 +40,7 @@ defmodule Lab.Fleet.Local do
 
     common = %{
       world: name,
-      clock: Robot.clock(),
+      clock: VirtualRobot.clock(),
       transport: transport,
       blobs: setup.options.blobs,
       mission: setup.mission,
@@ -48,14 +51,14 @@ defmodule Lab.Fleet.Local do
 
     pids =
       for robot <- setup.robots, into: %{} do
-        {:ok, pid} = Robot.start(part.(Elixir.Robot.Fleet), robot, common)
+        {:ok, pid} = VirtualRobot.start(part.(Robot.Fleet), robot, common)
         Process.monitor(pid)
         {pid, robot.id}
       end
 
     # So that it takes the first order of a person who has just started the fleet. A robot that cannot
     # arm does not delay the others for long.
-    Robot.await_armed(Map.values(pids))
+    VirtualRobot.await_armed(Map.values(pids))
 
     %__MODULE__{
       supervisor: supervisor,
@@ -77,7 +80,7 @@ defmodule Lab.Fleet.Local do
     # All at once: on a busy machine, a hundred pilots asked one after the other take long to
     # answer.
     options = [max_concurrency: 100, ordered: false, timeout: :infinity]
-    backend |> living() |> Task.async_stream(&Robot.begin/1, options) |> Stream.run()
+    backend |> living() |> Task.async_stream(&VirtualRobot.begin/1, options) |> Stream.run()
   end
 
   @impl Lab.Fleet.Backend
@@ -87,7 +90,7 @@ defmodule Lab.Fleet.Local do
   end
 
   @impl Lab.Fleet.Backend
-  def claims(backend), do: for(id <- living(backend), do: {id, Robot.claim(id)})
+  def claims(backend), do: for(id <- living(backend), do: {id, VirtualRobot.claim(id)})
 
   @impl Lab.Fleet.Backend
   def kill(backend, id) do
@@ -192,7 +195,7 @@ defmodule Lab.Fleet.Local do
     worlds ++
       server ++
       RadioServer.parts(options, options.script ++ options.cuts != []) ++
-      Hardware.parts(robots, name, folder) ++ [Elixir.Robot.Fleet]
+      Hardware.parts(robots, name, folder) ++ [Robot.Fleet]
   end
 
   defp parts_options, do: [strategy: :one_for_all, max_restarts: 0]

@@ -9,7 +9,8 @@ defmodule Lab.Fleet.Nodes do
   when it ends for the sixth time, so does the run.
   """
   @behaviour Lab.Fleet.Backend
-  alias Lab.Fleet.{Hardware, Network}
+  alias Lab.Node.Network
+  alias Lab.VirtualRobot.Hardware
   alias Lab.Fleet.Nodes.{Command, Host}
   alias Sim.World
   alias Sim.World.Snapshot
@@ -72,7 +73,7 @@ defmodule Lab.Fleet.Nodes do
     # One that cannot arm says why in its status.
     for id <- living(backend),
         vm = Fleet.vm(backend.nodes, id),
-        do: Vm.cast(vm, Lab.Fleet.Robot, :begin, [id])
+        do: Vm.cast(vm, Lab.VirtualRobot, :begin, [id])
 
     :ok
   end

@@ -7,7 +7,7 @@ defmodule Lab.Node.Fleet do
   All robots stand before the landmark, in a hall. They are whole, with the applications as in a release, whose end ends
   the node.
   """
-  alias Lab.Fleet.Network
+  alias Lab.Node.Network
   alias Sim.World
   alias Lab.Trial.Setup
   alias Sim.World.Snapshot

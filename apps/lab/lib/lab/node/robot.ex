@@ -5,17 +5,19 @@ defmodule Lab.Node.Robot do
       supervisor (one_for_all, no restarts: a robot that ends for good takes its node along)
       |-- Sim.World.Directory     where the world is
       |-- Sim.World.Line          the way to a world that is on no node of the same network
-      |-- Lab.Fleet.RadioServer  a radio that loses, duplicates and delays messages, if any is to
-      |-- Lab.Fleet.Hardware  emulated devices, if it has the real drivers
+      |-- Lab.RadioServer  a radio that loses, duplicates and delays messages, if any is to
+      |-- Lab.VirtualRobot.Hardware  emulated devices, if it has the real drivers
       `-- supervisor (one_for_one)  what else the fleet wants to run beside the robot
 
   Options: `robot` as in `Lab.Trial.Setup`, `world`, `blobs`, `mission`, `plan`, `folder` as in
-  `Lab.Fleet.Robot`, `radio` as `Lab.Fleet.RadioServer.parts/2` takes it; `line`, the path of `Sim.World.Line`;
+  `Lab.VirtualRobot`, `radio` as `Lab.RadioServer.parts/2` takes it; `line`, the path of `Sim.World.Line`;
   `beside`, more children; `restart: :permanent` for a robot that is started again for ever, as in a release.
   """
   @behaviour Lab.Node
   alias Robot.Departure.Note
-  alias Lab.Fleet.{Hardware, RadioServer, Robot}
+  alias Lab.VirtualRobot
+  alias Lab.VirtualRobot.Hardware
+  alias Lab.RadioServer
   alias Sim.World
 
   @impl Lab.Node
@@ -36,7 +38,7 @@ defmodule Lab.Node.Robot do
 
     common = %{
       world: options.world,
-      clock: Robot.clock(),
+      clock: VirtualRobot.clock(),
       transport: transport,
       blobs: options.blobs,
       mission: options.mission,
@@ -50,7 +52,7 @@ defmodule Lab.Node.Robot do
     if options.robot.hardware?,
       do: Note.delete(Hardware.drivers(options.robot, options.folder)[:departure_file])
 
-    {:ok, pid} = Robot.start(Elixir.Robot.Fleet, options.robot, common, options.restart)
+    {:ok, pid} = VirtualRobot.start(Robot.Fleet, options.robot, common, options.restart)
     if options.restart == :temporary, do: Process.link(pid)
     {:ok, nil, {__MODULE__, :report, [id, air]}}
   end
@@ -65,5 +67,5 @@ defmodule Lab.Node.Robot do
 
   @doc "What the robot claims about itself, and how many messages it sent."
   @spec report(atom(), pid() | RadioServer.counter()) :: {map(), map()}
-  def report(id, air), do: {Robot.claim(id), RadioServer.counts(air)}
+  def report(id, air), do: {VirtualRobot.claim(id), RadioServer.counts(air)}
 end

@@ -1,6 +1,6 @@
 defmodule Soak.Deeds.Shout do
   @moduledoc "Sends a stranger's datagrams to a node of a run, beside everything else."
-  alias Lab.Fleet.Network
+  alias Lab.Node.Network
   alias Soak.State
 
   # Between so many datagrams of a flood others get their turn.

@@ -7,7 +7,8 @@ defmodule Lab.Fleet.Nodes.Host do
   # who want to attach, its cookie is in a folder that only this user can read, and that goes with
   # the run however it ends (`Lab.Fleet.Folder`). So it is neither on a command line nor in an
   # environment.
-  alias Lab.Fleet.{Folder, Network}
+  alias Lab.Fleet.Folder
+  alias Lab.Node.Network
   alias Lab.Fleet.Nodes.PortMapper
   alias Mesh.Options
 

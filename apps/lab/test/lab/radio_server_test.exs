@@ -1,7 +1,7 @@
-defmodule Lab.Fleet.RadioServerTest do
+defmodule Lab.RadioServerTest do
   use ExUnit.Case, async: true
   alias Robot.Names
-  alias Lab.Fleet.RadioServer
+  alias Lab.RadioServer
   alias Lab.Trial.Options
 
   defp parts(options) do

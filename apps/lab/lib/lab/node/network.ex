@@ -1,4 +1,4 @@
-defmodule Lab.Fleet.Network do
+defmodule Lab.Node.Network do
   @moduledoc """
   Says how nodes of robots are started and how they find each other, on one machine: options of `Vm.start_one/1` and of
   their mesh. Runs beside each other share nothing.

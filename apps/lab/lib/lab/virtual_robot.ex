@@ -1,8 +1,8 @@
-defmodule Lab.Fleet.Robot do
+defmodule Lab.VirtualRobot do
   @moduledoc "Configures and starts one robot of a simulated fleet on this node, and reads its claims."
   alias Robot.Board
   alias Robot.Control.Pilot
-  alias Lab.Fleet.Hardware
+  alias Lab.VirtualRobot.Hardware
   alias Sim.World
   alias Robot.Mission.{Claim, Manual}
   alias Swarm.EStop

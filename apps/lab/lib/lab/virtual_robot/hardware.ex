@@ -1,4 +1,4 @@
-defmodule Lab.Fleet.Hardware do
+defmodule Lab.VirtualRobot.Hardware do
   @moduledoc """
   Gives robots of a simulated fleet the drivers of real ones: each has a base and a camera, emulated on pseudo-terminals
   whose links are in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in the world behind them.

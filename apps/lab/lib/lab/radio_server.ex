@@ -1,4 +1,4 @@
-defmodule Lab.Fleet.RadioServer do
+defmodule Lab.RadioServer do
   @moduledoc false
   # Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
   # that loses, duplicates and delays messages by `Sim.Radio`.
