@@ -28,17 +28,17 @@ defmodule Swarm do
   is sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{Behaviours, Commands, Formation, Replacement, Status}
+  alias Swarm.{BehaviourRegistry, Commands, Formation, Replacement, Status}
   alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Status.Matrix
-  alias Swarm.Missions.Text
+  alias Swarm.MissionRegistry.Text
   alias Swarm.Discovery.{Presence, Search}
 
   alias Swarm.Commands.StatusReport
 
   @type robot :: atom() | String.t()
-  @typedoc "A mission by its name, also as text, or by its module (`Swarm.Missions`)."
+  @typedoc "A mission by its name, also as text, or by its module (`Swarm.MissionRegistry`)."
   @type mission :: atom() | String.t()
   @type answer :: :ok | {:error, line :: String.t()}
 
@@ -73,7 +73,7 @@ defmodule Swarm do
 
   @doc """
   Starts the group's mission: that of each robot's file, else the first that is configured. Options: `robots`
-  that take part (default `:all`), and those of the mission (`Swarm.Missions`).
+  that take part (default `:all`), and those of the mission (`Swarm.MissionRegistry`).
 
       Swarm.start()
       Swarm.start(formation: {:diamond, 1.0}, robots: [:mag1, :mag2, :min1])
@@ -89,7 +89,7 @@ defmodule Swarm do
   def start(options), do: begin(nil, options)
 
   @doc """
-  Starts the mission of this name (`Swarm.Missions`), or of this module, on all robots or on `robots:`; the other
+  Starts the mission of this name (`Swarm.MissionRegistry`), or of this module, on all robots or on `robots:`; the other
   options are those of the mission. It replaces what the robots do.
 
       Swarm.start(:patrol)
@@ -105,14 +105,14 @@ defmodule Swarm do
   end
 
   @doc """
-  Runs a behaviour that the build has named (`Swarm.Behaviours`) on a robot, a list of them, or `:all`, with its options.
+  Runs a behaviour that the build has named (`Swarm.BehaviourRegistry`) on a robot, a list of them, or `:all`, with its options.
   Each leaves the group's mission for it, until its next start.
 
       Swarm.run(:mag1, :corners, side: 2.0)
   """
   @spec run(robot() | [robot()] | :all, behaviour :: atom() | String.t(), keyword()) :: answer()
   def run(to, behaviour, options \\ []) do
-    with {:ok, {module, options}} <- Behaviours.choose(behaviour, options),
+    with {:ok, {module, options}} <- BehaviourRegistry.choose(behaviour, options),
          do: command(to, {:run, module, options})
   end
 

@@ -433,7 +433,7 @@ defmodule PlayerTest do
     assert {:ok, result} = Player.import(text, profile: :magellan)
     why = "is not given, so that no infrared is read"
     assert {1, "rflex_ir_calib", why} in result.assumed
-    odd = Robot.File.Odd.lines(again(result.text), fn _device -> true end)
+    odd = Robot.File.Warnings.lines(again(result.text), fn _device -> true end)
 
     assert Enum.any?(odd, fn line ->
              line =~

@@ -10,7 +10,7 @@ defmodule Bench.Run do
   @typedoc """
   `formed_s` is `nil` if the fleet did not form (again) before its time was up. `claims` are all
   claims of the run, including those before the intervention; `stuck` counts robots that stood
-  short of their places without reporting it (`Lab.Trial.Stuck`).
+  short of their places without reporting it (`Lab.Trial.Progress`).
   """
   @type measured :: %{
           formed_s: float() | nil,

@@ -71,7 +71,7 @@ defmodule Bench.Table do
   @doc """
   How reliable the reports of the fleets were, as lines of text: how many claims of `formed` were
   true, all cases and maps pooled, and the worst case; how many robots were stuck and did not
-  report it (`Lab.Trial.Stuck`). A claim is true when the worst robot was at most half a metre off
+  report it (`Lab.Trial.Progress`). A claim is true when the worst robot was at most half a metre off
   at the claim and 5 s later (`Lab.Trial.Claims`).
   """
   @spec pooled([{String.t(), String.t(), number(), [Bench.Run.measured()]}]) :: String.t()

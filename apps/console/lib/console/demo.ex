@@ -149,7 +149,7 @@ defmodule Console.Demo do
   end
 
   defp task(%{mission: {module, _own}}, _scene) when module != Missions.Landmark,
-    do: Swarm.Missions.name(module)
+    do: Swarm.MissionRegistry.name(module)
 
   defp task(options, scene) do
     {kind, spacing} = scene.formation

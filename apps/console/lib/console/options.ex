@@ -10,7 +10,7 @@ defmodule Console.Options do
   alias Console.Pace
   alias Hal.Options.Suggest
   alias Sim.Floorplan.Maps
-  alias Swarm.Missions
+  alias Swarm.MissionRegistry
 
   defstruct robots: nil,
             seed: 1,
@@ -165,7 +165,7 @@ defmodule Console.Options do
       {"noise", "HOW", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "of wheels and pictures: off, default, slip (default)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
-       "#{Parse.either(Missions.names())}, with options of it\n(#{hd(Missions.names() ++ ["none"])})"},
+       "#{Parse.either(MissionRegistry.names())}, with options of it\n(#{hd(MissionRegistry.names() ++ ["none"])})"},
       {"formation", "KIND[:SPACING]", &Fleet.formation/1,
        "column, line, wedge, triangle, diamond or circle;\nspacing 0.8 to 5 m (column:1)"},
       {"assign", "HOW", &Parse.choice(&1, chain: :chain, cost: :cost),
@@ -240,7 +240,7 @@ the prompt then takes pause, step, speed"},
   defp check_mission({:ok, %{mission: nil}} = fine), do: fine
 
   defp check_mission({:ok, %{mission: text} = options}) do
-    case Missions.Text.read(text, length(options.robots)) do
+    case MissionRegistry.Text.read(text, length(options.robots)) do
       {:ok, mission} -> {:ok, %{options | mission: mission}}
       {:error, line} -> {:error, ["--mission: #{line}"]}
     end

@@ -10,7 +10,7 @@ defmodule Console.Prompt do
   alias Console.Prompt.Stop
   alias Hal.Options.Suggest
   alias Robot.Command
-  alias Swarm.{Behaviours, Missions}
+  alias Swarm.{BehaviourRegistry, MissionRegistry}
 
   @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge pause resume step speed status nodes page tell help quit)
 
@@ -144,12 +144,12 @@ defmodule Console.Prompt do
       ["tell"] -> ["all" | names]
       ["speed"] -> ["0.1", "1", "10", "max"]
       [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
-      ["start"] -> Missions.names() ++ names
-      ["start", name] -> if name in names, do: Missions.names(), else: []
+      ["start"] -> MissionRegistry.names() ++ names
+      ["start", name] -> if name in names, do: MissionRegistry.names(), else: []
       ["run"] -> names
-      ["run", name] -> if name in names, do: Behaviours.names(), else: []
-      ["replace"] -> Missions.names() ++ ["all" | names]
-      ["replace", name] -> if name in ["all" | names], do: Missions.names(), else: []
+      ["run", name] -> if name in names, do: BehaviourRegistry.names(), else: []
+      ["replace"] -> MissionRegistry.names() ++ ["all" | names]
+      ["replace", name] -> if name in ["all" | names], do: MissionRegistry.names(), else: []
       ["gamepad"] -> ["off" | names]
       [word] when word in ["goto", "follow", "drive", "stop", "status"] -> names
       _other -> []
@@ -177,7 +177,7 @@ defmodule Console.Prompt do
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
         "start patrol:period=90        starts another mission:",
-        "                              " <> Enum.join(Missions.names(), ", "),
+        "                              " <> Enum.join(MissionRegistry.names(), ", "),
         "replace flock                 they stand, change the mission, and go on;",
         "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
@@ -271,7 +271,7 @@ defmodule Console.Prompt do
   end
 
   defp command("run", [name, behaviour], robots) do
-    with {:ok, _run} <- Missions.Text.request({:run, behaviour}, nil),
+    with {:ok, _run} <- MissionRegistry.Text.request({:run, behaviour}, nil),
          do: tell(name, ["run", behaviour], robots)
   end
 
@@ -332,7 +332,7 @@ defmodule Console.Prompt do
   defp mission_of(who, [], robots), do: tell(who, ["start"], robots)
 
   defp mission_of(who, [mission], robots) do
-    case Missions.Text.read(mission, length(robots)) do
+    case MissionRegistry.Text.read(mission, length(robots)) do
       {:ok, _mission} -> tell(who, ["start", mission], robots)
       {:error, line} -> {:error, line <> or_robot(mission, robots)}
     end
@@ -343,11 +343,11 @@ defmodule Console.Prompt do
   end
 
   defp replace(who, mission, robots) do
-    with {:ok, _mission} <- Missions.Text.read(mission, length(robots)),
+    with {:ok, _mission} <- MissionRegistry.Text.read(mission, length(robots)),
          do: tell(who, ["replace", mission], robots)
   end
 
-  defp behaviour, do: List.first(Behaviours.names()) || "BEHAVIOUR"
+  defp behaviour, do: List.first(BehaviourRegistry.names()) || "BEHAVIOUR"
 
   defp or_robot(word, robots), do: Suggest.hint(word, Enum.map(robots, &to_string/1))
 

@@ -5,7 +5,7 @@ defmodule Hal.DeviceTest do
   @moduletag :realtime
 
   doctest Hal.Device.Liveness
-  doctest Hal.Device.Words
+  doctest Hal.Device.Explanation
 
   @zero Twist.zero()
   @modules [drive: Hal.FakeDrive, ptz: Hal.FakePtz, camera: Hal.FakeCamera]

@@ -8,7 +8,7 @@ defmodule Lab.Fleet do
   """
   use GenServer
   alias Hal.{Pose, Ticker}
-  alias Lab.Fleet.{Local, Mission, Nodes, Said}
+  alias Lab.Fleet.{Local, Mission, Nodes, PendingStages}
   alias Lab.Moment
   alias Sim.{Radio, Scene, World}
   alias Lab.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
@@ -46,7 +46,7 @@ defmodule Lab.Fleet do
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
       # Else a hundred robots ask for them one by one, each in a callback of its mission.
-      :ok = Swarm.Missions.load([:vision, :sim])
+      :ok = Swarm.MissionRegistry.load([:vision, :sim])
       answer = make_ref()
       start = {setup, backend, Map.put(own, :mission, begin?), {self(), answer}}
 
@@ -204,7 +204,7 @@ defmodule Lab.Fleet do
     heard = Faults.awake(s.faults, claims, now)
     worst = fn leader -> s |> run() |> Evaluation.worst(leader) end
     followers = fn -> s |> run() |> Evaluation.followers() end
-    {told, said} = Said.look(s.said, heard, s.run_log.roles)
+    {told, said} = PendingStages.look(s.said, heard, s.run_log.roles)
     parts = parts(s, Keyword.keys(claims))
 
     run_log =
@@ -323,8 +323,8 @@ defmodule Lab.Fleet do
   defp note({:killed, id}, s), do: note({:stage, :killed, id, %{}}, s)
 
   defp note({:stage, stage, id, facts}, s) do
-    if Said.waits?(stage, s.run_log.roles),
-      do: %{s | said: Said.hear(s.said, {stage, id, facts})},
+    if PendingStages.waits?(stage, s.run_log.roles),
+      do: %{s | said: PendingStages.hear(s.said, {stage, id, facts})},
       else: %{s | run_log: RunLog.stage(s.run_log, now(s), stage, id, facts)}
   end
 

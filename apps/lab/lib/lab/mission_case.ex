@@ -24,7 +24,7 @@ defmodule Lab.MissionCase do
   alias Robot.Mission.{Letter, Runner}
   alias Lab.{Run, Trial}
   alias Sim.World
-  alias Swarm.{Member, Message, Missions}
+  alias Swarm.{Member, Message, MissionRegistry}
 
   @settle_ms 3_000
   @rest_ms 5_000
@@ -37,12 +37,12 @@ defmodule Lab.MissionCase do
   function of a `Lab.Trial` that returns `:ok` or a line), `trial` (more options of `Lab.Trial.Setup.new/1`). Raises `ArgumentError` for a mission or
   options that are wrong.
   """
-  @spec problems(Missions.named(), keyword()) :: [String.t()]
+  @spec problems(MissionRegistry.named(), keyword()) :: [String.t()]
   def problems(mission, options \\ []) do
     options = Options.check!(options, table(), "mission case")
 
     mission =
-      case Missions.choose(mission, length(options[:robots])) do
+      case MissionRegistry.choose(mission, length(options[:robots])) do
         {:ok, mission} -> mission
         {:error, line} -> raise ArgumentError, line
       end

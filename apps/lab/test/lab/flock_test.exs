@@ -128,9 +128,9 @@ defmodule Lab.FlockTest do
 
   test "a wrong option is one line" do
     assert {:error, "flock option spacing: expected a number from 0.9 to 5 m, got 0.1"} =
-             Swarm.Missions.choose({:flock, spacing: 0.1}, 4)
+             Swarm.MissionRegistry.choose({:flock, spacing: 0.1}, 4)
 
-    assert {:error, line} = Swarm.Missions.Text.read("flock:sped=1", 4)
+    assert {:error, line} = Swarm.MissionRegistry.Text.read("flock:sped=1", 4)
     assert line =~ "did you mean speed?"
   end
 end

@@ -1,8 +1,8 @@
 defmodule Missions.NamedTest do
   # The missions that the configuration names are those of the whole build.
   use ExUnit.Case, async: false
-  alias Swarm.Missions
-  alias Swarm.Missions.Text
+  alias Swarm.MissionRegistry
+  alias Swarm.MissionRegistry.Text
 
   defmodule Tabled do
     @moduledoc "A mission that has a table of options, and nothing that checks them."
@@ -34,10 +34,13 @@ defmodule Missions.NamedTest do
 
   test "a name, as an atom or as text, and a module reach a mission" do
     for name <- [:tabled, "tabled", Tabled, {:tabled, []}, {Tabled, []}],
-        do: assert({:ok, {Tabled, [loop: :square, period: 60.0]}} == Missions.choose(name, 4))
+        do:
+          assert(
+            {:ok, {Tabled, [loop: :square, period: 60.0]}} == MissionRegistry.choose(name, 4)
+          )
 
-    assert Missions.name(Tabled) == "tabled"
-    assert Missions.name(Robot.Mission.Manual) == "Robot.Mission.Manual"
+    assert MissionRegistry.name(Tabled) == "tabled"
+    assert MissionRegistry.name(Robot.Mission.Manual) == "Robot.Mission.Manual"
   end
 
   test "what is no mission is refused in one line, with what may have been meant" do
@@ -53,7 +56,7 @@ defmodule Missions.NamedTest do
           {{:tabled, 5}, "mission :tabled options: expected [key: value, …], got 5"},
           {7, "mission: expected a name, or {name, [key: value, …]}, got 7"}
         ],
-        do: assert(Missions.choose(name, 4) == {:error, line})
+        do: assert(MissionRegistry.choose(name, 4) == {:error, line})
   end
 
   test "options as text are read by the mission's table" do

@@ -14,9 +14,9 @@ defmodule Robot.Command do
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
-  | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.Behaviours`) |
+  | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.BehaviourRegistry`) |
   | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
-  | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.Missions.Text`) |
+  | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.MissionRegistry.Text`) |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
 
   Robots refuse subscriptions, because all robots report their poses to all others anyway.

@@ -3,7 +3,7 @@ defmodule Swarm.Commands do
   # The helpers of `Swarm`: which robots are meant, what is allowed, and what they answer.
   alias Hal.Options
   alias Hal.Options.Suggest
-  alias Swarm.{Formation, Missions}
+  alias Swarm.{Formation, MissionRegistry}
   alias Swarm.{Commands, Transport}
 
   @doc "The ids of the given robots if all exist; the error is one line."
@@ -61,13 +61,13 @@ defmodule Swarm.Commands do
   end
 
   defp request(nil, options, count) do
-    with {:ok, mission} <- Missions.default(),
-         {:ok, options} <- Missions.options(mission, options, count),
+    with {:ok, mission} <- MissionRegistry.default(),
+         {:ok, options} <- MissionRegistry.options(mission, options, count),
          do: {:ok, {:start, options}}
   end
 
   defp request(mission, options, count) do
-    with {:ok, {module, options}} <- Missions.choose({mission, options}, count),
+    with {:ok, {module, options}} <- MissionRegistry.choose({mission, options}, count),
          do: {:ok, {:start, module, options}}
   end
 

@@ -9,7 +9,7 @@ defmodule Swarm.MemberSpec do
   """
   alias Hal.Options.{Type, Wording}
   alias Robot.File.Terms
-  alias Swarm.{Comms, Missions}
+  alias Swarm.{Comms, MissionRegistry}
 
   @doc """
   The robot of the file at `path`, or all its errors, one line each: `Robot.File.load/2`, with the
@@ -20,11 +20,11 @@ defmodule Swarm.MemberSpec do
 
   @doc """
   The types of those keys of a robot file that belong to the fleet, for `Robot.File`: `network:`
-  (`Mesh.Options.file_table/0`), and `policies:`, a mission (`Swarm.Missions`) with its options.
+  (`Mesh.Options.file_table/0`), and `policies:`, a mission (`Swarm.MissionRegistry`) with its options.
   """
   @spec tables() :: [{:network | :policies, Type.t()}]
   def tables do
-    mission = Missions.type()
+    mission = MissionRegistry.type()
 
     [
       network: {:keys, Mesh.Options.file_table()},
@@ -44,7 +44,7 @@ defmodule Swarm.MemberSpec do
   defp policies(named, [], _mission) when named in [[], [mission: nil]], do: {:ok, named}
 
   defp policies([mission: {_name, _own}] = named, [], _mission) do
-    with {:ok, _mission} <- Missions.choose(named[:mission], nil), do: {:ok, named}
+    with {:ok, _mission} <- MissionRegistry.choose(named[:mission], nil), do: {:ok, named}
   end
 
   defp policies([mission: {name, _own}], [{key, _value} | _], _mission) do
@@ -53,14 +53,14 @@ defmodule Swarm.MemberSpec do
 
   defp policies(named, options, mission) do
     with {:ok, module} <- module(named[:mission]),
-         {:ok, values} <- options(Missions.option_table(module), named, options, mission),
-         {:ok, _all} <- Missions.options(module, Keyword.delete(values, :mission), nil),
+         {:ok, values} <- options(MissionRegistry.option_table(module), named, options, mission),
+         {:ok, _all} <- MissionRegistry.options(module, Keyword.delete(values, :mission), nil),
          do: {:ok, values}
   end
 
   # Options without a mission are those of the first mission.
-  defp module(nil), do: Missions.default()
-  defp module(name), do: Missions.fetch(name)
+  defp module(nil), do: MissionRegistry.default()
+  defp module(name), do: MissionRegistry.fetch(name)
 
   defp options(nil, named, options, _mission) do
     case {Keyword.keyword?(options), Terms.strange(options)} do
@@ -98,8 +98,8 @@ defmodule Swarm.MemberSpec do
   defp mission(policies) do
     case Keyword.pop(policies, :mission) do
       {nil, _options} -> {:ok, nil}
-      {{_name, _own} = mission, []} -> Missions.choose(mission, nil)
-      {name, options} -> Missions.choose({name, options}, nil)
+      {{_name, _own} = mission, []} -> MissionRegistry.choose(mission, nil)
+      {name, options} -> MissionRegistry.choose({name, options}, nil)
     end
   end
 end

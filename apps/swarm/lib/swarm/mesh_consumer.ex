@@ -5,7 +5,7 @@ defmodule Swarm.MeshConsumer do
   """
   alias Robot.Names
   alias Swarm.Order.Freshness
-  alias Swarm.{Blackboard, Comms, EStop, Message, Missions, Transport}
+  alias Swarm.{Blackboard, Comms, EStop, Message, MissionRegistry, Transport}
 
   @behaviour Mesh.Consumer
 
@@ -14,7 +14,7 @@ defmodule Swarm.MeshConsumer do
   # understand what a leader sends.
   @impl Mesh.Consumer
   def services do
-    :ok = Missions.load()
+    :ok = MissionRegistry.load()
     %{rows: {Blackboard, :hear, []}, stop: {EStop, :hear, []}}
   end
 

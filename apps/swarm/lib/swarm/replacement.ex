@@ -14,7 +14,7 @@ defmodule Swarm.Replacement do
   off unless their file says `replace: true`. New code comes with a release (`rel/deploy`), or by IEx's `nl/2`.
   """
   alias Robot.{Board, Role}
-  alias Swarm.{Missions, Replacement}
+  alias Swarm.{MissionRegistry, Replacement}
   alias Swarm.Replacement.Order
 
   @doc "The process of a node, for its supervisor."
@@ -39,8 +39,8 @@ defmodule Swarm.Replacement do
     end
   end
 
-  defp mission(text, count) when is_binary(text), do: Missions.Text.read(text, count)
-  defp mission(named, count), do: Missions.choose(named, count)
+  defp mission(text, count) when is_binary(text), do: MissionRegistry.Text.read(text, count)
+  defp mission(named, count), do: MissionRegistry.choose(named, count)
 
   @doc "The request to this robot, signed by the key of this node, for the stamp that the robot has given; `nil` without a key."
   @spec seal(content :: binary(), robot :: atom(), Order.stamp()) :: tuple() | nil

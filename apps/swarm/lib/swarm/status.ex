@@ -52,7 +52,7 @@ defmodule Swarm.Status do
   The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
   with that age: `…, age 1240 ms by its row`.
   """
-  alias Hal.Device.Words
+  alias Hal.Device.Explanation
   alias Hal.{Odometry, Pose, Twist}
   alias Robot.Board
   alias Robot.Safety.LivenessMonitor
@@ -215,7 +215,7 @@ defmodule Swarm.Status do
   defp read(:offline, %{config: config} = seen) do
     for {device, {:offline, reason}} <- read(:health, seen),
         into: %{},
-        do: {device, config |> Map.fetch!(device) |> Words.offline(reason)}
+        do: {device, config |> Map.fetch!(device) |> Explanation.offline(reason)}
   end
 
   defp callers(nil), do: []

@@ -54,7 +54,7 @@ defmodule Swarm.ReplacementTest do
     assert_receive {_stage, %{stage: :replacement, what: :changing}}, 10_000
     assert_receive {_stage, %{stage: :replacement, what: :replaced} = about}, 10_000
     assert about.from == "#{node()}"
-    assert about.says == "was given #{Swarm.Missions.name(StandMission)} by #{node()}"
+    assert about.says == "was given #{Swarm.MissionRegistry.name(StandMission)} by #{node()}"
     eventually(fn -> match?(%{state: {_, :stand}, options: [formation: :line]}, mission(id)) end)
     assert Swarm.status(id).replaced == about.says
     assert inspect(Swarm.status(id)) =~ about.says

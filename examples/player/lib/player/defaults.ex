@@ -8,7 +8,7 @@ defmodule Player.Defaults do
   alias Player.State
 
   @echo_us 30_000
-  # The same as in Robot.File.Odd.
+  # The same as in Robot.File.Warnings.
   @slow_s 5.0
 
   @doc "The kind of robot: the one asked for, or a guess from its sensors and shape."

@@ -89,7 +89,7 @@ defmodule Mix.Tasks.Bench do
   defp mission(text, cases) do
     fewest = cases |> Enum.map(&Map.get(&1.options, :robots, 6)) |> Enum.min()
 
-    case Swarm.Missions.Text.read(text, fewest) do
+    case Swarm.MissionRegistry.Text.read(text, fewest) do
       {:ok, mission} -> {:ok, mission}
       {:error, line} -> {:error, ["--mission: #{line}"]}
     end
@@ -140,7 +140,7 @@ defmodule Mix.Tasks.Bench do
       {"seeds", "A-B", &Parse.span(&1, 0..100_000), "which seeds (1-40)"},
       {"cases", "NAME,NAME", &Bench.choose/1, "which cases (all)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
-       "#{Parse.either(Swarm.Missions.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.Missions.names() ++ ["none"])})"},
+       "#{Parse.either(Swarm.MissionRegistry.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.MissionRegistry.names() ++ ["none"])})"},
       {"landmark", "none", &Parse.choice(&1, none: :none),
        "none stands anywhere (it stands in the middle, or in the nearest room\nthat takes the fleet, and is an obstacle)"},
       {"maps", "NAME,NAME", &MapName.list/1,

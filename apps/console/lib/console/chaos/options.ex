@@ -1,7 +1,7 @@
 defmodule Console.Chaos.Options do
   @moduledoc "Reads the options of `mix chaos`. Pure. One table describes them and makes the help text."
   alias Hal.Cli.{Arguments, Parse}
-  alias Swarm.Missions
+  alias Swarm.MissionRegistry
 
   @most_runs 1_000_000
 
@@ -79,7 +79,7 @@ defmodule Console.Chaos.Options do
        "how many runs, from the first of the seed (100)"},
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295), "of all that is drawn (1)"},
       {"mission", "NAME[:KEY=VALUE,…]", &{:ok, &1},
-       "#{Parse.either(Missions.names())}, with options of it; all else is drawn as without\n(#{hd(Missions.names() ++ ["none"])})"},
+       "#{Parse.either(MissionRegistry.names())}, with options of it; all else is drawn as without\n(#{hd(MissionRegistry.names() ++ ["none"])})"},
       {"run", "N", &Parse.whole(&1, 1..@most_runs), "only this run of the seed"},
       {"attempts", "N", &Parse.whole(&1, 0..10_000),
        "to shrink each violation; 0 leaves the run as it is (40)"},
@@ -99,7 +99,7 @@ defmodule Console.Chaos.Options do
 
   # How many robots a run has is drawn.
   defp mission(%{mission: text} = options) do
-    case Missions.Text.read(text, nil) do
+    case MissionRegistry.Text.read(text, nil) do
       {:ok, mission} -> {:ok, %{options | mission: {text, mission}}}
       {:error, line} -> {:error, ["--mission: #{line}"]}
     end

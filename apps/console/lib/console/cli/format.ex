@@ -138,7 +138,7 @@ defmodule Console.Cli.Format do
   defp duration(ms) when ms < 120_000, do: "#{div(ms, 1_000)} s"
   defp duration(ms), do: "#{div(ms, 60_000)} min"
 
-  defp told({:start, module, _options}), do: "to start #{Swarm.Missions.name(module)}"
+  defp told({:start, module, _options}), do: "to start #{Swarm.MissionRegistry.name(module)}"
   defp told({:formation, kind, spacing}), do: "to form a #{kind} with #{decimals(spacing, 1)} m"
   defp told(command), do: to_string(command)
 

@@ -14,7 +14,7 @@ defmodule Console.Live.Trial do
   alias Console.Prompt
   alias Lab.{Recorder, Trial}
   alias Swarm.Commands
-  alias Swarm.Missions.Text
+  alias Swarm.MissionRegistry.Text
   @behaviour Console.Live
 
   @done {:ok, "done"}

@@ -54,7 +54,9 @@ defmodule Console.Page.Feed do
 
   @impl GenServer
   def handle_call(:map, _from, %{map: nil} = s) do
-    map = State.map(s.module.scene(s.live), s.module.offers(s.live), Swarm.Missions.names())
+    map =
+      State.map(s.module.scene(s.live), s.module.offers(s.live), Swarm.MissionRegistry.names())
+
     {:reply, map, %{s | map: map}}
   end
 

@@ -4,7 +4,7 @@ defmodule Hal.Device.Publisher do
   # arming, once, to sinks and events. Makes no decisions.
   alias Hal.Event
   alias Hal.Device.Arming
-  alias Hal.Device.{Obedience, State, Words}
+  alias Hal.Device.{Obedience, State, Explanation}
 
   @doc "Passes a reading to all sinks."
   @spec hand_on(State.t(), tuple()) :: :ok
@@ -92,7 +92,7 @@ defmodule Hal.Device.Publisher do
 
   @doc "A reason to be offline, in the words of the driver."
   @spec words(State.t(), reason :: term()) :: String.t()
-  def words(s, reason), do: Words.offline({s.driver, s.options}, reason)
+  def words(s, reason), do: Explanation.offline({s.driver, s.options}, reason)
 
   defp event(s, name, at_ms, more),
     do: Event.execute([:hal, :device, name], %{at_ms: at_ms}, Map.merge(about(s), more))

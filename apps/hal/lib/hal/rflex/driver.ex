@@ -58,7 +58,7 @@ defmodule Hal.RFlex.Driver do
   """
   @behaviour Hal.Drive
   alias Hal.{Serial, Twist}
-  alias Hal.RFlex.{Commands, Counters, Options, Outlook, Readings, Reception, Schedule, Speeds}
+  alias Hal.RFlex.{Commands, Counters, Options, OptionCheck, Readings, Receiver, Schedule, Speeds}
   alias Hal.RFlex.Protocol.{Command, Decoder, Queue}
 
   @tick_ms 50
@@ -112,15 +112,15 @@ defmodule Hal.RFlex.Driver do
   @doc "Whether the drive may be armed; the error names the missing conversions."
   @impl Hal.Drive
   def ready(%__MODULE__{options: options}),
-    do: Outlook.ready(options)
+    do: OptionCheck.ready(options)
 
-  @doc "What the options alone say; `Hal.RFlex.Outlook` judges both this and `ready/1`."
+  @doc "What the options alone say; `Hal.RFlex.OptionCheck` judges both this and `ready/1`."
   @impl Hal.Drive
   def judge(given) do
     with {:ok, options} <- Options.new(given) do
       senses = Commands.senses(options)
-      odd = Outlook.odd(options, given)
-      {:ok, %{ready: Outlook.ready(options), senses: senses, odd: odd}}
+      odd = OptionCheck.odd(options, given)
+      {:ok, %{ready: OptionCheck.ready(options), senses: senses, odd: odd}}
     end
   end
 
@@ -170,7 +170,7 @@ defmodule Hal.RFlex.Driver do
 
   def handle_message(message, s) do
     case Serial.handle(s.line, message) do
-      {:data, bytes} -> hear(Reception.bytes(s, bytes, now(s)))
+      {:data, bytes} -> hear(Receiver.bytes(s, bytes, now(s)))
       {:error, reason} -> {:error, reason, s}
       :unknown -> {:ok, [], s}
     end
@@ -228,7 +228,7 @@ defmodule Hal.RFlex.Driver do
 
   defp tick(s, at_ms) do
     Process.send_after(self(), {__MODULE__, s.ref, :tick}, @tick_ms)
-    {readings, s} = Reception.idle(s, at_ms)
+    {readings, s} = Receiver.idle(s, at_ms)
     s = s |> Speeds.say(at_ms) |> ask(at_ms) |> set_up(at_ms) |> Counters.tell(at_ms)
     {standing, s} = standing(s, at_ms)
 

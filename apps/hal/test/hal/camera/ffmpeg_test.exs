@@ -180,7 +180,7 @@ defmodule Hal.Camera.FFmpegTest do
     resized = {:resized, {320, 240}, {640, 360}}
     assert_receive {:health, :camera, {{:offline, ^resized}, _}}, 20_000
 
-    assert Hal.Device.Words.offline({FFmpeg, source: source}, resized) ==
+    assert Hal.Device.Explanation.offline({FFmpeg, source: source}, resized) ==
              "#{source}: its pictures were 320 x 240 and are 640 x 360 now; it is opened again"
 
     assert_receive {:frame, %{width: 640, height: 360}}, 20_000

@@ -6,7 +6,7 @@ defmodule Hal.RFlex.PartsTest do
   doctest Hal.RFlex.Conversions
   doctest Hal.RFlex.PowerSwitch
   doctest Hal.RFlex.Sensors.IndexSwitch
-  doctest Hal.RFlex.Outlook
+  doctest Hal.RFlex.OptionCheck
   doctest Hal.RFlex.Sensors.Infrared
   doctest Hal.RFlex.Protocol.Queue
   doctest Hal.RFlex.Sensors.Sonar

@@ -119,7 +119,7 @@ defmodule Hal.Visca.DriverTest do
     refuses? = &match?({:health, :ptz, {{:offline, {:refuses, :look, _}}, _}}, &1)
     {{:health, :ptz, {{:offline, reason}, _}}, camera} = play(camera, refuses?)
 
-    assert Hal.Device.Words.offline({Driver, port: link}, reason) ==
+    assert Hal.Device.Explanation.offline({Driver, port: link}, reason) ==
              "it refuses every look: it does not know the command (syntax error)"
 
     {_, camera} = play(put_in(camera.toy.refuse, nil), &match?({:health, :ptz, {:online, _}}, &1))

@@ -148,7 +148,7 @@ defmodule Lab.Check.Expectation do
 
   @doc "The phases that a robot may be in, with any mission that has a name (`c:Robot.Mission.phases/0`)."
   @spec phases() :: [atom()]
-  def phases, do: Enum.uniq(Swarm.Missions.phases() ++ @alone)
+  def phases, do: Enum.uniq(Swarm.MissionRegistry.phases() ++ @alone)
 
   @doc """
   The options of an expectation.

@@ -9,7 +9,7 @@ defmodule Lab.Check.Invariants do
   | `too_fast`, `too_abrupt`, `stop_ignored` | `Lab.Check.Limits` |
   | `stop_lost` | `Lab.Check.Stops` |
   | `collision` | contacts of `Sim.World`: a robot with a robot, alive or dead, or with a wall |
-  | `stuck` | `Lab.Trial.Stuck`: short of its slot for 20 s without a word |
+  | `stuck` | `Lab.Trial.Progress`: short of its slot for 20 s without a word |
   | `false_claim` | `Lab.Check.Claims`: `formed`, and the worst robot more than 0.5 m off then or 5 s later |
   | `crash` | a step of the run that raises (`Lab.Run`) |
 

@@ -1,18 +1,18 @@
 defmodule Lab.Check.Silences do
   @moduledoc false
-  # Judges `stuck` (`Lab.Trial.Stuck`): no robot is short of its slot for 20 s without a word, but one that was frozen
+  # Judges `stuck` (`Lab.Trial.Progress`): no robot is short of its slot for 20 s without a word, but one that was frozen
   # meanwhile and could not report it. Pure.
   @behaviour Lab.Check.Kind
   import Lab.Check.Violation, only: [decimals: 2]
   alias Lab.Check.Violation
-  alias Lab.Trial.Stuck
+  alias Lab.Trial.Progress
 
   @impl Lab.Check.Kind
   def new(_options), do: 0
 
   @impl Lab.Check.Kind
   def note(_asked, %{at_ms: at_ms, faults: faults, run_log: log}, known) do
-    told = Stuck.report(log.stuck)
+    told = Progress.report(log.stuck)
 
     wrong =
       for %{robot: id, at_s: at_s, error_m: error_m} <- Enum.drop(told, known),

@@ -1,10 +1,10 @@
 defmodule Lab.Fleet.Mission do
   @moduledoc false
   # Reads the option `mission:` of a fleet: `true` starts the mission of its setup, `false` does not start it; a name
-  # (`Swarm.Missions`), with options or without, or `{module, options}` starts another `Robot.Mission`. Pure, except that
+  # (`Swarm.MissionRegistry`), with options or without, or `{module, options}` starts another `Robot.Mission`. Pure, except that
   # it loads the module.
   alias Lab.Trial.Setup
-  alias Swarm.Missions
+  alias Swarm.MissionRegistry
 
   # The apps that are available in a robot's own process of the operating system.
   @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
@@ -30,7 +30,7 @@ defmodule Lab.Fleet.Mission do
     cond do
       # A name is no module, and a wrong one has a better explanation.
       is_binary(module) or not String.starts_with?(Atom.to_string(module), "Elixir.") ->
-        with {:ok, chosen} <- Missions.choose(mission, length(setup.robots)),
+        with {:ok, chosen} <- MissionRegistry.choose(mission, length(setup.robots)),
              do: choose(setup, chosen, nodes?)
 
       not Keyword.keyword?(options) ->

@@ -4,7 +4,7 @@ defmodule Lab.Trial.Evaluation do
   # the leader's true pose. Robots never see this. Pure.
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Lab.Trial.{AgreementMetrics, Claims, RunLog, Setup, Stuck}
+  alias Lab.Trial.{AgreementMetrics, Claims, RunLog, Setup, Progress}
 
   @typedoc "A run at one moment; `claims` are those of the living robots."
   @type run :: %{
@@ -88,7 +88,7 @@ defmodule Lab.Trial.Evaluation do
       collisions: run.world.collisions,
       min_separation_m: run.world.min_separation,
       claims: Claims.report(run.run_log.claims, run.at_ms, &worst(run, &1)),
-      stuck: Stuck.report(run.run_log.stuck),
+      stuck: Progress.report(run.run_log.stuck),
       messages: run.messages,
       agreement: AgreementMetrics.report(run.run_log.agreement),
       fleet: for(r <- scene.robots, do: row(r, Map.get(slots, r.id), run.claims[r.id]))
@@ -96,7 +96,7 @@ defmodule Lab.Trial.Evaluation do
   end
 
   # The one that was asked for by its name, if any.
-  defp mission(%{mission: {module, _options}}), do: Swarm.Missions.name(module)
+  defp mission(%{mission: {module, _options}}), do: Swarm.MissionRegistry.name(module)
   defp mission(_default), do: nil
 
   @doc """
@@ -113,8 +113,8 @@ defmodule Lab.Trial.Evaluation do
     Enum.max(errors, fn -> nil end)
   end
 
-  @doc "The living followers whose progress `Lab.Trial.Stuck` judges."
-  @spec followers(run()) :: [Stuck.row()]
+  @doc "The living followers whose progress `Lab.Trial.Progress` judges."
+  @spec followers(run()) :: [Progress.row()]
   def followers(run) do
     leader = RunLog.leader(run.run_log)
 

@@ -125,7 +125,7 @@ defmodule Lab.Trial.Event do
 
   defp named(text) do
     with {:ok, command} <- Command.parse(text, []),
-         {:ok, _request} <- Swarm.Missions.Text.request(command, nil),
+         {:ok, _request} <- Swarm.MissionRegistry.Text.request(command, nil),
          do: true
   end
 
@@ -229,7 +229,7 @@ defmodule Lab.Trial.Event do
   @spec request(command :: term(), [atom()]) :: term()
   def request("" <> text, robots) do
     {:ok, command} = Command.parse(text, robots)
-    {:ok, request} = Swarm.Missions.Text.request(command, length(robots))
+    {:ok, request} = Swarm.MissionRegistry.Text.request(command, length(robots))
     request
   end
 

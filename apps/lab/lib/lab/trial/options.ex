@@ -4,7 +4,7 @@ defmodule Lab.Trial.Options do
   alias Hal.Options.{Suggest, Type, Wording}
   alias Missions.Landmark
   alias Lab.Trial.{Cuts, Event}
-  alias Swarm.Missions
+  alias Swarm.MissionRegistry
 
   @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
           "{x, y} in metres"}
@@ -44,7 +44,7 @@ defmodule Lab.Trial.Options do
 
   @doc "The table of all options: what is allowed."
   @spec table() :: Options.table()
-  def table, do: own() ++ mission() ++ [mission: [Missions.type(), default: nil]]
+  def table, do: own() ++ mission() ++ [mission: [MissionRegistry.type(), default: nil]]
 
   defp own do
     [
@@ -86,7 +86,7 @@ defmodule Lab.Trial.Options do
   defp named(%{mission: nil} = options), do: {:ok, options}
 
   defp named(%{mission: mission, robots: robots} = options) do
-    with {:ok, {module, own} = mission} <- Missions.choose(mission, length(robots)) do
+    with {:ok, {module, own} = mission} <- MissionRegistry.choose(mission, length(robots)) do
       shared = if module == Landmark, do: Map.new(Keyword.take(own, Keyword.keys(@mission)))
       {:ok, Map.merge(%{options | mission: mission}, shared || %{})}
     end
@@ -118,7 +118,7 @@ defmodule Lab.Trial.Options do
   def plan(nil), do: :known
 
   def plan(mission) do
-    case Missions.choose(mission, nil) do
+    case MissionRegistry.choose(mission, nil) do
       {:ok, {module, _own}} -> if function_exported?(module, :map, 1), do: :none, else: :known
       {:error, _line} -> :known
     end

@@ -4,7 +4,7 @@ defmodule Lab.Trial.RunLog do
   # with what the living robots claim.
 
   alias Sim.Scene
-  alias Lab.Trial.{AgreementMetrics, Claims, Stuck}
+  alias Lab.Trial.{AgreementMetrics, Claims, Progress}
 
   defstruct mission: nil,
             roles: %{},
@@ -22,7 +22,7 @@ defmodule Lab.Trial.RunLog do
             estop: nil,
             agreement: %Lab.Trial.AgreementMetrics{},
             claims: %Lab.Trial.Claims{},
-            stuck: %Lab.Trial.Stuck{}
+            stuck: %Lab.Trial.Progress{}
 
   @type stage :: %{
           required(:stage) => atom(),
@@ -55,7 +55,7 @@ defmodule Lab.Trial.RunLog do
           estop: Scene.estop() | nil,
           agreement: Lab.Trial.AgreementMetrics.t(),
           claims: Lab.Trial.Claims.t(),
-          stuck: Lab.Trial.Stuck.t()
+          stuck: Lab.Trial.Progress.t()
         }
 
   @doc "An empty run log of a mission; of a run without an end with how much of it is kept."
@@ -153,10 +153,10 @@ defmodule Lab.Trial.RunLog do
     %{run_log | claims: %{claims | told: newest(run_log, claims.told)}}
   end
 
-  @doc "The same tick for the invariant of `Lab.Trial.Stuck`; `rows` is called once a second."
-  @spec watch(t(), integer(), (... -> [Stuck.row()])) :: t()
+  @doc "The same tick for the invariant of `Lab.Trial.Progress`; `rows` is called once a second."
+  @spec watch(t(), integer(), (... -> [Progress.row()])) :: t()
   def watch(run_log, at_ms, rows) do
-    stuck = Stuck.note(run_log.stuck, at_ms, rows)
+    stuck = Progress.note(run_log.stuck, at_ms, rows)
     %{run_log | stuck: %{stuck | told: newest(run_log, stuck.told)}}
   end
 

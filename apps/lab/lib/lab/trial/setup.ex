@@ -30,7 +30,7 @@ defmodule Lab.Trial.Setup do
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Lab.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Lab.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
-  (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.Missions`: `:patrol`,
+  (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """

@@ -284,7 +284,7 @@ defmodule Lab.Check.InvariantsTest do
     test "what the trial says of robots that are stuck, but for one that was frozen" do
       trial = trial(%{script: [{1, {:freeze, :mag1, 2}}]})
       silence = %{at_s: 10.0, robot: :mag1, error_m: 1.25}
-      log = %{trial.run_log | stuck: %Lab.Trial.Stuck{told: [silence]}}
+      log = %{trial.run_log | stuck: %Lab.Trial.Progress{told: [silence]}}
       trial = %{trial | run_log: log, at_ms: 30_000}
       judge = tick(Invariants.new(trial.options), trial)
       assert [%Violation{invariant: :stuck, figures: figures}] = Invariants.violations(judge)

@@ -5,7 +5,7 @@ defmodule Robot.File.Summary do
   """
   alias Hal.{Pose, Profile}
   alias Robot.Recorder
-  alias Robot.File.{Device, Odd}
+  alias Robot.File.{Device, Warnings}
 
   @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
   @weights %{magellan: 20, atrv_mini: 40}
@@ -13,7 +13,7 @@ defmodule Robot.File.Summary do
   @wide 88
 
   @doc """
-  The report on a file without errors: a title with the number of warnings (`Robot.File.Odd`), the
+  The report on a file without errors: a title with the number of warnings (`Robot.File.Warnings`), the
   lines of `lines/1`, and the warnings. `there?` reports whether a device exists on this machine,
   `writable?` whether a recording can be written into a folder.
   """
@@ -29,7 +29,7 @@ defmodule Robot.File.Summary do
         there? \\ &File.exists?/1,
         writable? \\ &Robot.Recorder.Options.writable?/1
       ) do
-    odd = Odd.lines(robot, there?, &kind/1) ++ unwritable(robot.record, writable?)
+    odd = Warnings.lines(robot, there?, &kind/1) ++ unwritable(robot.record, writable?)
 
     title =
       case length(odd) do

@@ -5,7 +5,7 @@ defmodule Robot.Safety.Readiness do
   to move the robot later, when it is armed, no matter by what: a person, or, with `arm: :auto`, the
   drive itself. In a dry run nothing moves, and every order is accepted.
   """
-  alias Hal.Device.Words
+  alias Hal.Device.Explanation
   alias Robot.Board
 
   @typedoc "The board's entries `:arming` and `{:health, :drive}`; `nil` if there is none yet."
@@ -27,7 +27,7 @@ defmodule Robot.Safety.Readiness do
         judge(entry(board, :arming), nil)
 
       {:offline, reason} ->
-        judge(entry(board, :arming), {:offline, Words.offline(drive, reason)})
+        judge(entry(board, :arming), {:offline, Explanation.offline(drive, reason)})
 
       health ->
         judge(entry(board, :arming), health)

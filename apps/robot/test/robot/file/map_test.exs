@@ -66,7 +66,7 @@ defmodule Robot.File.MapTest do
         start: Hal.Pose.new(x, 7.5)
       }
 
-      Robot.File.Odd.lines(robot, fn _device -> true end)
+      Robot.File.Warnings.lines(robot, fn _device -> true end)
     end
 
     assert odd.(1.0) == []

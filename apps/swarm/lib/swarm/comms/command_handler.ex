@@ -13,7 +13,7 @@ defmodule Swarm.Comms.CommandHandler do
   | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
   | `:sonar` | `{:ok, [{where, metres}]}`: what its sonars measured last, or why that is not known |
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
-  | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.Missions`) |
+  | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.MissionRegistry`) |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
   | `:arm`, `:acknowledge` | for the wheels (`Hal.Device`): done, or why not |
@@ -30,7 +30,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Robot.Mission.Manual
   alias Nav.{Grid, Reach}
   alias Mesh.Nonblocking
-  alias Swarm.{Behaviours, Missions, Replacement, Status}
+  alias Swarm.{BehaviourRegistry, MissionRegistry, Replacement, Status}
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
@@ -164,19 +164,19 @@ defmodule Swarm.Comms.CommandHandler do
   defp checked({:start, options}, config) do
     with {:ok, {:start, options}} <- Order.check({:start, options}),
          {:ok, {module, _defaults}} <- mission(config),
-         {:ok, options} <- Missions.options(module, options, nil),
+         {:ok, options} <- MissionRegistry.options(module, options, nil),
          do: {:ok, {:start, options}}
   end
 
   defp checked({:start, mission, options}, _config) do
     with {:ok, _order} <- Order.check({:start, mission, options}),
-         {:ok, {module, options}} <- Missions.choose({mission, options}, nil),
+         {:ok, {module, options}} <- MissionRegistry.choose({mission, options}, nil),
          do: {:ok, {:start, module, options}}
   end
 
   defp checked({:run, behaviour, options}, _config) do
     with {:ok, _order} <- Order.check({:run, behaviour, options}),
-         {:ok, {module, options}} <- Behaviours.choose(behaviour, options),
+         {:ok, {module, options}} <- BehaviourRegistry.choose(behaviour, options),
          do: {:ok, {:run, module, options}}
   end
 
@@ -268,7 +268,7 @@ defmodule Swarm.Comms.CommandHandler do
   end
 
   defp mission(%{mission: nil}),
-    do: with({:ok, module} <- Missions.default(), do: {:ok, {module, []}})
+    do: with({:ok, module} <- MissionRegistry.default(), do: {:ok, {module, []}})
 
   defp mission(%{mission: mission}), do: {:ok, mission}
 

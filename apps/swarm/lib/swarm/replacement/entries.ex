@@ -5,7 +5,7 @@ defmodule Swarm.Replacement.Entries do
   alias Hal.Event
   alias Robot.{Board, Names}
   alias Robot.Mission.Manual
-  alias Swarm.Missions
+  alias Swarm.MissionRegistry
   alias Swarm.Replacement.{Job, Order}
 
   # Slower wheels rest; m/s, rad/s.
@@ -81,7 +81,7 @@ defmodule Swarm.Replacement.Entries do
         else: with(%{mission: mission} <- before, do: mission)
 
     {module, _options} = job.mission
-    says = says(what, why, Missions.name(module), order.from)
+    says = says(what, why, MissionRegistry.name(module), order.from)
     about = %{robot: robot, stage: :replacement, what: what, from: order.from}
 
     with {:ok, at_ms} <-

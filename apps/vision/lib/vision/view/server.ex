@@ -5,7 +5,7 @@ defmodule Vision.View.Server do
   # the camera or ffmpeg.
   use GenServer
   alias Hal.Frame
-  alias Hal.Device.Words
+  alias Hal.Device.Explanation
   alias Vision.View.{EncoderControl, Subscribers}
 
   @doc "The error for a viewer on another node than the camera's."
@@ -190,7 +190,7 @@ defmodule Vision.View.Server do
   end
 
   defp why_none(%{camera: {:offline, reason}}),
-    do: "the camera is offline (#{Words.offline({nil, []}, reason)})"
+    do: "the camera is offline (#{Explanation.offline({nil, []}, reason)})"
 
   defp why_none(s), do: "the camera gave no frame within #{s.snapshot_ms} ms"
 

@@ -16,7 +16,7 @@ defmodule Mix.Tasks.Robot.Import do
   """
   use Mix.Task
   alias Hal.Options.Suggest
-  alias Robot.File.{Odd, Schema}
+  alias Robot.File.{Warnings, Schema}
 
   @options [
     {"out", "OUT", &Hal.Cli.Parse.text/1,
@@ -63,7 +63,7 @@ defmodule Mix.Tasks.Robot.Import do
     with {:ok, robot} <- made(text, file, out),
          {:ok, _config} <- Robot.File.config(robot) do
       # It does not matter yet whether its devices exist here.
-      odd = Odd.lines(robot, fn _device -> true end)
+      odd = Warnings.lines(robot, fn _device -> true end)
       if odd != [], do: say("Odd; check whether this is meant:")
       Enum.each(odd, &say("  #{&1}"))
     else

@@ -1,4 +1,4 @@
-defmodule Swarm.Missions do
+defmodule Swarm.MissionRegistry do
   @moduledoc """
   Lists the missions for groups that this node knows, by name. They live in apps above this one, so the configuration
   lists them:
@@ -13,7 +13,7 @@ defmodule Swarm.Missions do
   alias Hal.Options.{Suggest, Type, Wording}
   alias Robot.File.Terms
   alias Robot.Mission
-  alias Swarm.Behaviours
+  alias Swarm.BehaviourRegistry
 
   @typedoc "How people name a mission: by its name, also as text, or by its module; with options or without."
   @type named ::
@@ -46,7 +46,7 @@ defmodule Swarm.Missions do
   end
 
   defp hint(name, shown, names) do
-    if to_string(name) in Behaviours.names(),
+    if to_string(name) in BehaviourRegistry.names(),
       do: "; #{name} is a behaviour: run:#{name}",
       else: Suggest.hint(shown, names)
   end

@@ -1,4 +1,4 @@
-defmodule Lab.Trial.Stuck do
+defmodule Lab.Trial.Progress do
   @moduledoc """
   Checks an invariant of every run from outside, by true poses: a follower that makes no progress
   says so. Pure; fed once a second.

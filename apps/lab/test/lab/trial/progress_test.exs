@@ -1,20 +1,20 @@
-defmodule Lab.Trial.StuckTest do
+defmodule Lab.Trial.ProgressTest do
   use Lab.LockstepCase, async: true
   import Lab.TrialRuns
   alias Hal.Pose
   alias Lab.Trial
-  alias Lab.Trial.{Evaluation, Stuck}
+  alias Lab.Trial.{Evaluation, Progress}
   @moduletag :slow
 
   # One follower for `seconds`; `row` gives its error, and what differs, for a second.
   defp play(seconds, row) do
-    Enum.reduce(0..seconds, %Stuck{}, fn s, stuck ->
-      Stuck.note(stuck, s * 1000, fn ->
+    Enum.reduce(0..seconds, %Progress{}, fn s, stuck ->
+      Progress.note(stuck, s * 1000, fn ->
         plain = %{id: :a, under_way?: true, error_m: 3.0, slot: Pose.new(0, 0)}
         [Map.merge(plain, row.(s))]
       end)
     end)
-    |> Stuck.report()
+    |> Progress.report()
   end
 
   test "a robot that stands short of its place for 20 s without reporting it is recorded once" do
@@ -57,8 +57,11 @@ defmodule Lab.Trial.StuckTest do
   end
 
   test "it asks once a second" do
-    asked = fn stuck, at_ms -> Stuck.note(stuck, at_ms, fn -> send(self(), at_ms) && [] end) end
-    Enum.reduce(0..20, %Stuck{}, &asked.(&2, &1 * 100))
+    asked = fn stuck, at_ms ->
+      Progress.note(stuck, at_ms, fn -> send(self(), at_ms) && [] end)
+    end
+
+    Enum.reduce(0..20, %Progress{}, &asked.(&2, &1 * 100))
     assert_received 0
     assert_received 1000
     assert_received 2000

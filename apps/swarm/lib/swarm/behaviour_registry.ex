@@ -1,4 +1,4 @@
-defmodule Swarm.Behaviours do
+defmodule Swarm.BehaviourRegistry do
   @moduledoc """
   Lists the behaviours that a build has given names (`Robot.Behaviour`), for people who run one on a robot:
 

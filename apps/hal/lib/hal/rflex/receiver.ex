@@ -1,4 +1,4 @@
-defmodule Hal.RFlex.Reception do
+defmodule Hal.RFlex.Receiver do
   @moduledoc false
   # Turns bytes from a driver's line into readings. Time is passed in, in milliseconds.
   alias Hal.RFlex.{Driver, Readings}

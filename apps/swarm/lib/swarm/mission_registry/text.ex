@@ -1,12 +1,12 @@
-defmodule Swarm.Missions.Text do
+defmodule Swarm.MissionRegistry.Text do
   @moduledoc """
-  Missions, and behaviours (`Swarm.Behaviours`), as people type them, `patrol` or `patrol:period=90,loop=square`: a name, and the options of its
+  Missions, and behaviours (`Swarm.BehaviourRegistry`), as people type them, `patrol` or `patrol:period=90,loop=square`: a name, and the options of its
   table (`c:Robot.Mission.option_table/0`). A value is a word (`square`, `on`), a number, `kind:number` (a formation's
   `wedge:1.2`), or Elixir's notation (`[{1,2},{3,4}]`). Pure; no text becomes an atom.
   """
   alias Hal.Options.Type
   alias Robot.File.{Reader, Terms}
-  alias Swarm.{Behaviours, Missions}
+  alias Swarm.{BehaviourRegistry, MissionRegistry}
 
   @doc """
   The module of a mission and its checked options; `robots` is how many start together, `nil` if that
@@ -17,9 +17,10 @@ defmodule Swarm.Missions.Text do
   def read(text, robots) do
     {name, options} = split(text)
 
-    with {:ok, module} <- Missions.fetch(name),
-         {:ok, options} <- options(Missions.name(module), Missions.option_table(module), options),
-         {:ok, options} <- Missions.options(module, options, robots),
+    with {:ok, module} <- MissionRegistry.fetch(name),
+         {:ok, options} <-
+           options(MissionRegistry.name(module), MissionRegistry.option_table(module), options),
+         {:ok, options} <- MissionRegistry.options(module, options, robots),
          do: {:ok, {module, options}}
   end
 
@@ -36,10 +37,10 @@ defmodule Swarm.Missions.Text do
   def request({:run, text}, _robots) do
     {name, options} = split(text)
 
-    with {:ok, module} <- Behaviours.fetch(name),
-         table = Missions.option_table(module),
-         {:ok, options} <- options(Behaviours.name(module), table, options),
-         {:ok, {module, options}} <- Behaviours.choose(module, options),
+    with {:ok, module} <- BehaviourRegistry.fetch(name),
+         table = MissionRegistry.option_table(module),
+         {:ok, options} <- options(BehaviourRegistry.name(module), table, options),
+         {:ok, {module, options}} <- BehaviourRegistry.choose(module, options),
          do: {:ok, {:run, module, options}}
   end
 

@@ -1,8 +1,8 @@
-defmodule Robot.File.OddTest do
+defmodule Robot.File.WarningsTest do
   use ExUnit.Case, async: true
-  alias Robot.File.Odd
+  alias Robot.File.Warnings
 
-  doctest Odd
+  doctest Warnings
 
   defp warnings(serial) do
     robot = %Robot.File{
@@ -12,7 +12,7 @@ defmodule Robot.File.OddTest do
       drive: {Some.Drive, [port: "/dev/ttyS0", serial: serial]}
     }
 
-    Odd.lines(robot, fn _device -> true end)
+    Warnings.lines(robot, fn _device -> true end)
   end
 
   test "a line without last words is told" do
@@ -30,7 +30,10 @@ defmodule Robot.File.OddTest do
       drive: {Some.Drive, [port: "ttyS7"]}
     }
 
-    told = fn kind -> Odd.lines(robot, &(&1 == "/dev/ttyS7"), fn "/dev/ttyS7" -> kind end) end
+    told = fn kind ->
+      Warnings.lines(robot, &(&1 == "/dev/ttyS7"), fn "/dev/ttyS7" -> kind end)
+    end
+
     assert ["ttyS7 has no hardware behind it here" <> _] = told.(:no_hardware)
     assert ["ttyS7 is a console of this machine" <> _] = told.(:console)
     assert ["ttyS7 is a plain file here" <> _] = told.(:regular)

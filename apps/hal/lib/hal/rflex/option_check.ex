@@ -1,4 +1,4 @@
-defmodule Hal.RFlex.Outlook do
+defmodule Hal.RFlex.OptionCheck do
   @moduledoc false
   # Judges a base by its options alone, before its line is opened: whether it may be armed, what it
   # reads, and which allowed values are unusual. The driver and `mix robot.check` use it. Pure.
@@ -13,7 +13,7 @@ defmodule Hal.RFlex.Outlook do
   law are not read, and do not prevent it.
 
       iex> {:ok, options} = Hal.RFlex.Options.new(port: "/dev/ttyR0", conversions: [range: 1474.0])
-      iex> Hal.RFlex.Outlook.ready(options)
+      iex> Hal.RFlex.OptionCheck.ready(options)
       {:error, "conversions are missing: distance (units per metre), angle (units per radian)"}
   """
   @spec ready(Options.t()) :: :ok | {:error, line :: String.t()}
@@ -26,7 +26,7 @@ defmodule Hal.RFlex.Outlook do
 
       iex> given = [port: "/dev/ttyR0", conversions: [distance: 31.387]]
       iex> {:ok, options} = Hal.RFlex.Options.new(given)
-      iex> Hal.RFlex.Outlook.odd(options, given)
+      iex> Hal.RFlex.OptionCheck.odd(options, given)
       ["conversions.distance: 31.387 units a metre is odd; 31387.0 is usual"]
   """
   @spec odd(Options.t(), keyword()) :: [String.t()]

@@ -1,4 +1,4 @@
-defmodule Hal.Device.Words do
+defmodule Hal.Device.Explanation do
   @moduledoc "Describes what is wrong with a device, in one line for people. Pure."
 
   @longest 240
@@ -7,16 +7,16 @@ defmodule Hal.Device.Words do
   Why the device is offline: the driver's explanation of the reason (`c:Hal.Drive.explain/2`), or
   the reason itself; `nil` stands for an unknown driver.
 
-      iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :enoent)
+      iex> Hal.Device.Explanation.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :enoent)
       "/dev/ttyR0: no such device"
-      iex> Hal.Device.Words.offline({Some.Driver, []}, :odd)
+      iex> Hal.Device.Explanation.offline({Some.Driver, []}, :odd)
       ":odd"
-      iex> Hal.Device.Words.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :fell)
+      iex> Hal.Device.Explanation.offline({Hal.RFlex.Driver, port: "/dev/ttyR0"}, :fell)
       "its process crashed, and is started again"
-      iex> long = Hal.Device.Words.offline({Hal.RFlex.Driver, port: String.duplicate("/dir", 99)}, :enoent)
+      iex> long = Hal.Device.Explanation.offline({Hal.RFlex.Driver, port: String.duplicate("/dir", 99)}, :enoent)
       iex> {String.length(long), String.ends_with?(long, "…" <> String.slice(long, -119, 119)), long =~ "no such device"}
       {239, true, true}
-      iex> Hal.Device.Words.offline({Some.Driver, []}, {:refuses, :look, "it does not know the command"})
+      iex> Hal.Device.Explanation.offline({Some.Driver, []}, {:refuses, :look, "it does not know the command"})
       "it refuses every look: it does not know the command"
   """
   @spec offline({driver :: module() | nil, options :: keyword()}, reason :: term()) :: String.t()

@@ -1,4 +1,4 @@
-defmodule Lab.Fleet.Said do
+defmodule Lab.Fleet.PendingStages do
   @moduledoc false
   # Holds back announcements of a live fleet (one leads, its fleet is formed) until the robots'
   # claims show them. Pure.
@@ -32,9 +32,9 @@ defmodule Lab.Fleet.Said do
   One reading of the claims: returns what can be announced now, and what still waits.
 
       iex> formed = {:formed, :mag1, %{epoch: 2}}
-      iex> said = Lab.Fleet.Said.hear([], formed)
-      iex> {[], said} = Lab.Fleet.Said.look(said, [mag1: %{phase: :lead}], %{lead: :leads})
-      iex> Lab.Fleet.Said.look(said, [mag1: %{phase: :lead, formed: true}], %{lead: :leads})
+      iex> said = Lab.Fleet.PendingStages.hear([], formed)
+      iex> {[], said} = Lab.Fleet.PendingStages.look(said, [mag1: %{phase: :lead}], %{lead: :leads})
+      iex> Lab.Fleet.PendingStages.look(said, [mag1: %{phase: :lead, formed: true}], %{lead: :leads})
       {[{:formed, :mag1, %{epoch: 2}}], []}
   """
   @spec look(t(), [{robot :: atom(), claim :: map()}], roles()) :: {[stage()], t()}

@@ -1,4 +1,4 @@
-defmodule Robot.File.Odd do
+defmodule Robot.File.Warnings do
   @moduledoc """
   Warns of values in a robot file that are allowed but seldom intended. Most warnings name the
   key, and the usual value if there is one. A person should look at them before a robot of up to
@@ -22,17 +22,17 @@ defmodule Robot.File.Odd do
 
       iex> robot = %Robot.File{id: :mag1, profile: Hal.Profile.magellan(), start: Hal.Pose.new(0, 0),
       ...>   drive: {Some.Drive, [port: "/dev/ttyS9"]}, limits: [max_turn_acceleration: 0.017]}
-      iex> Robot.File.Odd.lines(robot, fn _device -> false end)
+      iex> Robot.File.Warnings.lines(robot, fn _device -> false end)
       ["limits.max_turn_acceleration: with 0.017 rad/s2 it takes 59 s to turn at full speed; 1.0 is usual",
        "/dev/ttyS9 is not on this machine; it must be on the robot's"]
       iex> robot = %{robot | drive: {Some.Drive, [port: "/run/base"]}, limits: []}
-      iex> Robot.File.Odd.lines(robot, &(&1 == "/dev/base"))
+      iex> Robot.File.Warnings.lines(robot, &(&1 == "/dev/base"))
       ["/run/base is not on this machine; it must be on the robot's"]
-      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "base"]}}, &(&1 == "/dev/base"))
+      iex> Robot.File.Warnings.lines(%{robot | drive: {Some.Drive, [port: "base"]}}, &(&1 == "/dev/base"))
       []
-      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "/tmp"]}}, fn _ -> true end, fn _ -> :directory end)
+      iex> Robot.File.Warnings.lines(%{robot | drive: {Some.Drive, [port: "/tmp"]}}, fn _ -> true end, fn _ -> :directory end)
       ["/tmp is a directory here; a serial line is a device"]
-      iex> Robot.File.Odd.lines(%{robot | drive: {Some.Drive, [port: "ttyS0"]}}, fn _ -> true end, fn _ -> :no_hardware end)
+      iex> Robot.File.Warnings.lines(%{robot | drive: {Some.Drive, [port: "ttyS0"]}}, fn _ -> true end, fn _ -> :no_hardware end)
       ["ttyS0 has no hardware behind it here; a USB adapter is /dev/ttyUSB0 or /dev/ttyACM0"]
   """
   @spec lines(Robot.File.t(), (Path.t() -> boolean()), (Path.t() -> atom())) :: [String.t()]
