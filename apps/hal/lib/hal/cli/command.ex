@@ -46,7 +46,7 @@ defmodule Hal.Cli.Command do
 
       with {:ok, given, words} <- Arguments.parse_words(arguments, table) do
         if List.keymember?(given, "help", 0),
-          do: Mix.shell().info(String.replace(help, @listed, Arguments.help(table))),
+          do: IO.puts(String.replace(help, @listed, Arguments.help(table))),
           else: told(carry_out.(given, words))
       else
         {:error, lines} -> refuse(name, lines)

@@ -88,4 +88,28 @@ defmodule Swarm.Status.Words do
   @doc "All that its fields say, in the order of the line."
   @spec all(Status.t()) :: [String.t()]
   def all(status), do: for(name <- Status.fields(), words = of(name, status), do: words)
+
+  defimpl Inspect, for: Swarm.Status do
+    def inspect(status, _options) do
+      [first | rest] = [speed(status) | Swarm.Status.Words.all(status)]
+      words = ["#{status.robot} #{status.state} #{place(status)} #{first}" | rest]
+      "#" <> Enum.join(words, ", ")
+    end
+
+    defp place(%{pose: nil}), do: "(pose unknown)"
+
+    defp place(%{pose: %{x: x, y: y, heading: heading}, uncertainty: metres}) do
+      degrees = round(heading * 180 / :math.pi())
+
+      "(#{fixed(x)}, #{fixed(y)}, #{degrees} deg)" <>
+        if(metres, do: " ±#{fixed(metres)} m,", else: "")
+    end
+
+    defp speed(%{speed: nil}), do: "speed unknown"
+
+    defp speed(status),
+      do: "#{fixed(status.speed)} m/s" <> if(status.by, do: " by #{status.by}", else: "")
+
+    defp fixed(number), do: :erlang.float_to_binary(number * 1.0, decimals: 2)
+  end
 end
