@@ -16,7 +16,10 @@ defmodule Robot.MixProject do
       compilers: Convoy.Support.compilers([:native | Mix.compilers()], Mix.env()),
       test_ignore_filters: Convoy.Support.files(),
       native: [
-        nifs: [silhouettes: ["silhouettes.c", "silhouettes_nif.c"]]
+        nifs: [
+          particles: ["particles.c", "particles_nif.c"],
+          silhouettes: ["silhouettes.c", "silhouettes_nif.c"]
+        ]
       ],
       start_permanent: Mix.env() == :prod,
       deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]

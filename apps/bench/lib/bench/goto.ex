@@ -48,8 +48,9 @@ defmodule Bench.Goto do
     end
   end
 
-  # The robot elsewhere than the setup puts it.
-  defp placed(%{robots: [robot], map: map, options: options} = setup, from) do
+  @doc "A setup of one robot with that robot elsewhere than the setup puts it."
+  @spec placed(Setup.t(), Pose.t()) :: Setup.t()
+  def placed(%{robots: [robot], map: map, options: options} = setup, from) do
     body = %{id: robot.id, profile: robot.profile, pose: from}
     world = Sim.World.new!(map: map, seed: options.seed, noise: options.noise, robots: [body])
     %{setup | world: world, robots: [%{robot | start: from}]}

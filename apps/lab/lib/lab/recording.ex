@@ -17,7 +17,7 @@ defmodule Lab.Recording do
   alias Lab.Trial
   alias Lab.Trial.Setup
 
-  @version 4
+  @version 5
   @start "/convoy/start"
   @ticks "/convoy/ticks"
   @encoding "erlang-term"

@@ -24,6 +24,8 @@ defmodule Robot.Config do
     * `:arm` - `:auto` (the default), or `:manual`: the wheels stand until a person arms them
     * `:plan` - the walls of the building, `%Nav.Grid{}` in the `map` frame, an empty
       `Nav.OccupancyGrid` for those that the sonars will have seen, or `nil` (the default) for none
+    * `:seed` - that of the random numbers with which the robot looks for its place on a floor plan (`Robot.Localiser.MonteCarlo`),
+      with its name; 0 by default
     * `:fence` - a fence that the robot must not cross, `{{x, y}, {x, y}}` or `[{x, y}, …]`, see
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
@@ -61,6 +63,7 @@ defmodule Robot.Config do
                 pace: :clock,
                 arm: :auto,
                 plan: nil,
+                seed: 0,
                 fence: nil,
                 dry_run: false,
                 replace: false,
@@ -90,6 +93,7 @@ defmodule Robot.Config do
           pace: :clock | :manual,
           arm: :auto | :manual,
           plan: Nav.Grid.t() | Nav.OccupancyGrid.t() | nil,
+          seed: non_neg_integer(),
           fence: Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
@@ -159,6 +163,7 @@ defmodule Robot.Config do
       pace: {:one_of, [:clock, :manual]},
       arm: {:one_of, [:auto, :manual]},
       plan: [{:check, &plan?/1, "walls"}, default: nil],
+      seed: {:integer, 0, 4_294_967_295},
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       replace: {:one_of, [false, true]},

@@ -14,8 +14,20 @@ defmodule Robot.Localiser do
   """
   alias Hal.{Odometry, Pose}
   alias Robot.Departure
-  alias Robot.Localiser.{Anchors, Belief, Frame, History, Sightings, TurnCheck, Walls}
+
+  alias Robot.Localiser.{
+    Anchors,
+    Belief,
+    Frame,
+    History,
+    MonteCarlo,
+    Sightings,
+    TurnCheck,
+    Walls
+  }
+
   alias Robot.Localiser.Belief.Marks
+  alias Nav.Grid
   alias Robot.Percept
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
@@ -27,6 +39,13 @@ defmodule Robot.Localiser do
   @nearly 0.12 * 0.12
   # A robot that was started again on its way has found its place when it knows it by this (m).
   @found_radius 1.0
+
+  # A belief that is vaguer than this (metres) tells the filter of the plan nothing. One is set by that filter if it contradicts
+  # it by so many standard deviations, and more than so many metres, or is vaguer by so much.
+  @hint 1.0
+  @contradicts 3.0
+  @apart 0.5
+  @vaguer 2.5
 
   # A robot that is told where it stands believes that if it knows its place less by this factor.
   @less_sure 1.5
@@ -46,7 +65,9 @@ defmodule Robot.Localiser do
                 frame_no: nil,
                 turn_check: nil,
                 plan?: false,
-                walls: %Walls{}
+                walls: %Walls{},
+                seed: 0,
+                monte_carlo: nil
               ]
 
   # Frame numbers are sent to other robots, which accept none above half a billion.
@@ -72,15 +93,19 @@ defmodule Robot.Localiser do
           frame_no: non_neg_integer() | nil,
           turn_check: TurnCheck.t(),
           plan?: boolean(),
-          walls: Walls.t()
+          walls: Walls.t(),
+          seed: integer(),
+          monte_carlo: MonteCarlo.t() | nil
         }
 
   @doc """
   The localiser of a robot whose odometry reads zero at the pose `start`. If it has `departed` from there, that is so
-  only in this frame of its odometry (`Robot.Departure`); in another one, it could be anywhere.
+  only in this frame of its odometry (`Robot.Departure`); in another one, it could be anywhere. `seed` is that of the
+  random numbers with which it looks for its place on a floor plan.
   """
-  @spec new(Pose.t(), Departure.frame() | nil) :: t()
-  def new(%Pose{} = start, departed \\ nil), do: %__MODULE__{start: start, departed: departed}
+  @spec new(Pose.t(), Departure.frame() | nil, seed :: integer()) :: t()
+  def new(%Pose{} = start, departed \\ nil, seed \\ 0),
+    do: %__MODULE__{start: start, departed: departed, seed: seed}
 
   @doc """
   Sets the references from now on. In a new frame, the pose's uncertainty grows by that of the
@@ -163,11 +188,79 @@ defmodule Robot.Localiser do
       |> remember(percept.at_ms)
       |> see(percept)
       |> hear(percept)
+      |> judged(percept)
       |> told()
       |> found()
 
     percept = exposed(percept, localiser)
     {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
+  end
+
+  # The filter of the plan goes its own way, whose frame the robot is in, and corrects what it contradicts.
+  defp judged(%{monte_carlo: nil} = localiser, %{grid: %Grid{closed?: true}} = percept) do
+    filter = MonteCarlo.new(percept, start(localiser), localiser.seed, localiser.lost?)
+    %{localiser | monte_carlo: filter}
+  end
+
+  defp judged(%{monte_carlo: %MonteCarlo{} = before, belief: belief} = localiser, percept) do
+    filter = MonteCarlo.update(before, percept, hint(localiser), belief.pose)
+    localiser = %{localiser | monte_carlo: filter}
+
+    cond do
+      filter.at_ms == before.at_ms -> localiser
+      filter.search != nil -> astray(localiser, before, percept)
+      true -> agree(localiser, MonteCarlo.estimate(filter))
+    end
+  end
+
+  defp judged(localiser, _percept), do: localiser
+
+  # By marks or by other robots it may find its place again, too.
+  defp astray(%{lost?: false} = localiser, %{search: %{}}, percept),
+    do: judged(%{localiser | monte_carlo: nil}, percept)
+
+  defp astray(localiser, %{search: %{}}, _percept), do: localiser
+
+  defp astray(localiser, _knew, _percept) do
+    belief = Frame.lost(localiser.belief)
+    %{localiser | belief: belief, lost?: true, plan?: false, walls: %Walls{}}
+  end
+
+  defp agree(localiser, nil), do: localiser
+
+  defp agree(localiser, {pose, variance}) do
+    placed = placed(localiser, pose, variance)
+    {worst, _least, _heading} = Belief.sd(localiser.belief)
+    {now, _least, _heading} = Belief.sd(placed)
+    off = Pose.distance(placed.pose, localiser.belief.pose)
+    # A vague leader goes on as it does: all that follow it would have to turn with it.
+    vague? = worst > @vaguer * now and (localiser.anchors.walls? or localiser.lost?)
+
+    if vague? or
+         (off > @apart and off > @contradicts * :math.sqrt(worst * worst + now * now)),
+       do: renumber(%{localiser | belief: placed, lost?: false, walls: %Walls{}}),
+       else: localiser
+  end
+
+  # A belief on the plan, in the present frame.
+  defp placed(%{belief: belief, frame: frame}, pose, variance) do
+    belief = belief |> Marks.forget() |> Belief.set(pose, variance)
+
+    if frame,
+      do: Frame.joined(belief, frame.at, elem(frame.start, 0), elem(frame.start, 1)),
+      else: belief
+  end
+
+  # Where it believes to be on the plan.
+  defp start(%{belief: belief} = localiser) do
+    {worst, _least, heading} = Belief.sd(belief)
+    {square, turn} = if localiser.frame, do: localiser.frame.start, else: {0.0, 0.0}
+    {belief.pose, {:math.sqrt(worst * worst + square), :math.sqrt(heading * heading + turn)}}
+  end
+
+  defp hint(localiser) do
+    {_pose, {place_sd, _heading_sd}} = hint = start(localiser)
+    if place_sd < @hint, do: hint
   end
 
   # The same error is in all that is told, so it counts only for a robot that knows less.
@@ -195,6 +288,7 @@ defmodule Robot.Localiser do
     %{
       radius: Anchors.radius(spread),
       lost?: localiser.lost?,
+      place: localiser.monte_carlo && MonteCarlo.told(localiser.monte_carlo),
       position: position,
       spread: spread,
       heading: heading,
@@ -234,6 +328,7 @@ defmodule Robot.Localiser do
         turn_check: nil,
         plan?: false,
         walls: %Walls{},
+        monte_carlo: nil,
         belief: Belief.doubt(localiser.belief)
     }
 
@@ -286,8 +381,11 @@ defmodule Robot.Localiser do
   def by_walls?(%__MODULE__{frame: frame, anchors: anchors, plan?: plan?}),
     do: anchors.walls? and planned?(frame, if(plan?, do: @nearly, else: @aligned))
 
+  # The walls that one faces which was carried away are others.
   defp hear(localiser, percept) do
-    if by_walls?(localiser) do
+    carried? = localiser.monte_carlo != nil and MonteCarlo.lost?(localiser.monte_carlo)
+
+    if by_walls?(localiser) and not carried? do
       {walls, belief} = Walls.correct(localiser.walls, localiser.belief, percept)
       kept? = localiser.frame != nil or walls.vague?
       plan? = if kept?, do: localiser.plan?, else: Walls.right?(walls)

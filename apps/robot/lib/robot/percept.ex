@@ -47,7 +47,8 @@ defmodule Robot.Percept do
 
   @typedoc """
   The uncertainty of the pose. By the filter's estimate, the error is within `radius` metres in 95
-  of 100 cases. It is `lost?` if it was started again on its way and has not found its place since.
+  of 100 cases. It is `lost?` if it was started again on its way, or finds by its floor plan that it is elsewhere, and has not found its place since; `place` is what the
+  plan says (`Robot.Localiser.MonteCarlo.told/1`), `nil` for nothing.
   `position` (along the direction of greatest uncertainty, metres; see also
   `spread`) and `heading` (radians) are standard deviations. `frame` is the key of the frame of
   the pose (`Robot.Localiser.Anchors`), `nil` for the frame of the start poses; `start` are the
@@ -59,6 +60,7 @@ defmodule Robot.Percept do
   @type uncertainty :: %{
           radius: float(),
           lost?: boolean(),
+          place: :tracking | {:ambiguous | :lost, String.t()} | nil,
           position: float(),
           spread: Robot.Localiser.Anchors.spread(),
           heading: float(),
@@ -95,4 +97,19 @@ defmodule Robot.Percept do
           grid: Nav.Grid.t() | nil,
           ways: Nav.Grid.t() | nil
         }
+
+  @doc """
+  Why the robot does not know where it is on its floor plan, for people; `nil` of one that knows, or has no plan that it could
+  trust. What it is then in place for, or done with, it must not say.
+
+      iex> percept = %Robot.Percept{robot: :mag1, at_ms: 0, profile: Hal.Profile.magellan()}
+      iex> for place <- [:tracking, {:lost, "lost: nothing of what it hears fits the plan"}],
+      ...>   do: Robot.Percept.astray(%{percept | uncertainty: %{place: place}})
+      [nil, "lost: nothing of what it hears fits the plan"]
+      iex> Robot.Percept.astray(percept)
+      nil
+  """
+  @spec astray(t()) :: String.t() | nil
+  def astray(%{uncertainty: %{place: {_state, reason}}}), do: reason
+  def astray(_percept), do: nil
 end

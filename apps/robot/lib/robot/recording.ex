@@ -18,7 +18,7 @@ defmodule Robot.Recording do
   alias Robot.Replay
   alias Robot.Replay.Roles
 
-  @version 5
+  @version 6
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"

@@ -46,7 +46,7 @@ defmodule Swarm.Member do
   A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
   `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `colours` (what its camera looks
   for, `Vision.Colours`; `nil` for a robot without), `plan` (the walls of a floor
-  plan, `Nav.Grid`, or a `Nav.OccupancyGrid` for those that its sonars will have seen), `order` (a
+  plan, `Nav.Grid`, or a `Nav.OccupancyGrid` for those that its sonars will have seen), `seed` (`Robot.Config`), `order` (a
   seed from which the order is drawn in which roles hear each other; `nil`: as they tell it).
   """
   @spec new(keyword()) :: t()
@@ -54,13 +54,15 @@ defmodule Swarm.Member do
     options =
       Keyword.validate!(
         options,
-        [:id, :profile, :start, :mission, boot: 1, colours: nil, plan: nil, order: nil]
+        [:id, :profile, :start, :mission, boot: 1, colours: nil, plan: nil, seed: 0, order: nil]
       )
 
     {module, mission_options} = options[:mission]
 
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
-    given = Keyword.take(options, [:id, :profile, :start, :plan, :mission, :boot, :colours])
+    given =
+      Keyword.take(options, [:id, :profile, :start, :plan, :seed, :mission, :boot, :colours])
+
     camera = options[:colours] && {__MODULE__, []}
     others = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}, camera: camera, pace: :manual]
     config = struct!(Robot.Config, given ++ others)
@@ -142,7 +144,7 @@ defmodule Swarm.Member do
   What the robot's mission claims (`t:Robot.Mission.effect/0`).
   """
   @spec claim(t()) :: map()
-  def claim(member), do: runner(member).claim
+  def claim(member), do: Runner.claim(runner(member))
 
   @doc "The callers of the emergency stop that holds the robot (`Swarm.EStop.State.callers/1`); `nil` if none does."
   @spec held(t()) :: [String.t()] | nil

@@ -181,8 +181,13 @@ defmodule Swarm.Status do
 
   defp read(name, %{entries: entries}) when name in [:pose, :power], do: value(entries, name)
 
-  defp read(name, %{entries: entries}) when name in [:leader, :epoch, :blocked_by, :says],
+  defp read(name, %{entries: entries}) when name in [:leader, :epoch, :blocked_by],
     do: entries |> entry(:mission, :claim) |> field(name)
+
+  defp read(:says, %{entries: entries}) do
+    said = entries |> entry(:mission, :claim) |> field(:says)
+    said || astray(value(entries, :uncertainty))
+  end
 
   defp read(:replaced, %{entries: entries}), do: entry(entries, :replaced, :says)
   defp read(:uncertainty, %{entries: entries}), do: entry(entries, :uncertainty, :radius)
@@ -217,6 +222,10 @@ defmodule Swarm.Status do
         into: %{},
         do: {device, config |> Map.fetch!(device) |> Explanation.offline(reason)}
   end
+
+  # A robot without a mission, too, says why it does not know where it is.
+  defp astray(%{place: {_state, reason}}), do: reason
+  defp astray(_content), do: nil
 
   defp callers(nil), do: []
   defp callers(stop), do: EStop.State.callers(stop)

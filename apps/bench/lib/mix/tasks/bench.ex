@@ -98,7 +98,12 @@ defmodule Mix.Tasks.Bench do
   defp measure(%{"help" => true}), do: help()
 
   defp measure(given) do
-    cases = given |> Map.get("cases", Bench.cases()) |> without_landmark(given["landmark"])
+    cases =
+      given
+      |> Map.get("cases", Bench.cases())
+      |> with_option(:landmark, given["landmark"])
+      |> with_option(:plan, given["plan"])
+
     maps = Map.get(given, "maps", ["hall", "hospital"])
     seeds = Map.get(given, "seeds", 1..40)
     blobs = Map.get(given, "blobs", :painted)
@@ -117,8 +122,8 @@ defmodule Mix.Tasks.Bench do
     if failed != [], do: refuse(failed)
   end
 
-  defp without_landmark(cases, nil), do: cases
-  defp without_landmark(cases, :none), do: Enum.map(cases, &put_in(&1.options[:landmark], :none))
+  defp with_option(cases, _key, nil), do: cases
+  defp with_option(cases, key, value), do: Enum.map(cases, &put_in(&1.options[key], value))
 
   defp rows(results, cases, maps) do
     for case <- cases,
@@ -143,6 +148,8 @@ defmodule Mix.Tasks.Bench do
        "#{Parse.either(Swarm.MissionRegistry.names())}: measured is when each robot first claims that it has\nwhat its mission wants (#{hd(Swarm.MissionRegistry.names() ++ ["none"])})"},
       {"landmark", "none", &Parse.choice(&1, none: :none),
        "none stands anywhere (it stands in the middle, or in the nearest room\nthat takes the fleet, and is an obstacle)"},
+      {"plan", "HOW", &Parse.choice(&1, known: :known, sonar: :sonar, none: :none),
+       "what robots know of walls: the floor plan (known), what their sonars have\nseen (sonar), or nothing (none)"},
       {"maps", "NAME,NAME", &MapName.list/1,
        "which maps: names, FILE.yaml, FILE.png:WIDTHxHEIGHT or FILE.pgm:…\n(hall,hospital)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),

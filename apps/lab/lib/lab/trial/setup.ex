@@ -88,6 +88,7 @@ defmodule Lab.Trial.Setup do
           mission: setup.mission,
           colours: World.colours(),
           plan: setup.plan,
+          seed: options.seed,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
   end

@@ -5,6 +5,7 @@ defmodule Missions.Landmark.Leader do
   # judges whether the shape is formed. Pure.
   alias Hal.Pose
   alias Robot.Localiser.Anchors
+  alias Robot.Percept
   alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
@@ -173,6 +174,7 @@ defmodule Missions.Landmark.Leader do
   defp judge(mission) do
     good? =
       Landmark.State.sees?(mission) and Landmark.State.slow?(mission.percept, 0.05) and
+        Percept.astray(mission.percept) == nil and
         Enum.all?(mission.order, &in_place?(mission, &1))
 
     now = mission.now_ms

@@ -61,11 +61,12 @@ defmodule Robot.Control.Controller do
   frame at which the odometry reads zero, with which the controller estimates the percept's pose by
   `Robot.Localiser`, and `departed`, see there; `plan`, the walls of a floor plan
   (`Nav.Grid`) in the map frame, or an empty `Nav.OccupancyGrid` for those that its sonars will
-  have seen; without either it knows none.
+  have seen; without either it knows none; `seed`, that of the random numbers with which it looks for its place on the plan.
   """
   @spec new(keyword()) :: t()
   def new(options) do
-    options = Keyword.validate!(options, [:profile, start: nil, departed: nil, plan: nil])
+    options =
+      Keyword.validate!(options, [:profile, start: nil, departed: nil, plan: nil, seed: 0])
 
     case options[:profile] do
       %Profile{} = profile ->
@@ -73,7 +74,8 @@ defmodule Robot.Control.Controller do
           profile: profile,
           escape: Escape.new([]),
           rest: Rest.new([]),
-          localiser: options[:start] && Localiser.new(options[:start], options[:departed]),
+          localiser:
+            options[:start] && Localiser.new(options[:start], options[:departed], options[:seed]),
           walls: KnownWalls.new(options[:plan])
         }
 

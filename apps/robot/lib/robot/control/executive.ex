@@ -125,7 +125,8 @@ defmodule Robot.Control.Executive do
           profile: config.profile,
           start: config.start,
           departed: departed,
-          plan: config.plan
+          plan: config.plan,
+          seed: config.seed
         ),
       departure: if(departed, do: {:was, departed}, else: {:near, nil})
     }

@@ -378,7 +378,7 @@ defmodule Robot.Control.Pilot do
     {:put, :mission,
      %{
        state: s.state,
-       claim: s.runner.claim,
+       claim: Runner.claim(s.runner),
        since_ms: s.since_ms,
        ticked_ms: s.runner.ticked_ms,
        options: s.options

@@ -289,6 +289,19 @@ defmodule Robot.Localiser.Belief do
     end
   end
 
+  @doc """
+  The belief at a pose that has nothing to do with what it believed: with this variance of x, covariance, variance of y (m2) and of
+  the heading (rad2). It has no marks; what it knows of its wheels remains.
+  """
+  @spec set(t(), Pose.t(), {float(), float(), float(), float()}) :: t()
+  def set(%__MODULE__{marks: []} = belief, pose, {xx, xy, yy, hh}) do
+    [_x, _y, _heading | rest] = belief.covariance
+    others = for [_x, _y, _heading | row] <- rest, do: [0.0, 0.0, 0.0 | row]
+    zeros = List.duplicate(0.0, length(rest))
+    own = for row <- [[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, hh]], do: row ++ zeros
+    %{belief | pose: pose, covariance: own ++ others, refused: 0, contradicted: 0}
+  end
+
   # The gain of the common error is zero: its covariances shrink, its variance does not.
   defp reduce(covariance, v, s) do
     covariance

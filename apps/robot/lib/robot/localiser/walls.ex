@@ -133,9 +133,11 @@ defmodule Robot.Localiser.Walls do
     end
   end
 
-  defp others?(%{peers: peers}, _sonar, _range) when peers == %{}, do: false
+  @doc "Whether an echo heard by a sonar at this pose (in the frame of the percept's peers) may be that of another robot."
+  @spec others?(Percept.t(), sonar :: Pose.t(), range :: float()) :: boolean()
+  def others?(%{peers: peers}, _sonar, _range) when peers == %{}, do: false
 
-  defp others?(%{peers: peers, profile: profile}, sonar, range) do
+  def others?(%{peers: peers, profile: profile}, sonar, range) do
     Enum.any?(peers, fn {_id, %{pose: pose, radius: radius}} ->
       Cones.sent?({pose.x, pose.y, radius}, sonar, range, profile.sonar_cone)
     end)

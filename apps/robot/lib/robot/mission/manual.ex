@@ -10,7 +10,8 @@ defmodule Robot.Mission.Manual do
   Its phase is the command's name, then `:done`; for `find_blob`, `:found` or `:not_found`. A `goto` that the robot gives up
   (`Robot.Behaviour.Goto`) ends as `:given_up`: the stage of this name, and the claim's `blocked_by`, say why; from a door, or
   where no robot gets past it, it goes aside (`Nav.PassingPlace`). One that ends
-  where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so.
+  where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so; a robot that
+  does not know where it is on its floor plan (`Robot.Percept.astray/1`) has given up.
 
   A robot that is followed need not do anything: its heartbeats are the position updates that a
   subscription asks for, so robots refuse a subscription. A follower keeps 1 m behind
@@ -85,6 +86,15 @@ defmodule Robot.Mission.Manual do
     gone = {:stage, :given_up, %{x: x, y: y, blocked_by: why}}
     claim = {:claim, %{phase: :idle, standing: true, blocked_by: why}}
     result(%{mission | why: why}, [gone, claim | aside(percept, {x, y}, mission.count)])
+  end
+
+  def handle(
+        {:tick, %Percept{uncertainty: %{place: {_state, why}}}},
+        %{command: {:goto, x, y, _heading}, result: 1, why: nil} = mission
+      ) do
+    gone = {:stage, :given_up, %{x: x, y: y, blocked_by: why}}
+    claim = {:claim, %{phase: :idle, standing: true, blocked_by: why}}
+    result(%{mission | result: 2, why: why}, [gone, claim])
   end
 
   def handle(

@@ -23,6 +23,7 @@ defmodule Robot.Mission.Runner do
                 phase: :idle,
                 claim: %{},
                 ticked_ms: nil,
+                astray: nil,
                 halted: nil,
                 grid: nil,
                 refused: 0
@@ -33,7 +34,7 @@ defmodule Robot.Mission.Runner do
   `resume/1`. `ticked_ms` is the time of the last percept that the mission handled: its claim is
   as old as that, whatever else it has heard since. `refused` counts the messages that were not for it
   (`Robot.Mission.Letter`). `grid` is what the robot knows of walls: each percept gets it on its
-  way to the mission.
+  way to the mission. `astray` is why the robot did not know its place at that tick (`Robot.Percept.astray/1`).
   """
   @type t :: %__MODULE__{
           robot: atom(),
@@ -42,6 +43,7 @@ defmodule Robot.Mission.Runner do
           phase: atom(),
           claim: map(),
           ticked_ms: integer() | nil,
+          astray: String.t() | nil,
           halted: {module(), mission :: term()} | nil,
           grid: Grid.t() | nil,
           refused: non_neg_integer()
@@ -96,8 +98,29 @@ defmodule Robot.Mission.Runner do
 
   defp walled(event, _runner), do: event
 
-  defp note_tick(runner, {:tick, %{at_ms: at_ms}}), do: %{runner | ticked_ms: at_ms}
+  defp note_tick(runner, {:tick, %Percept{at_ms: at_ms} = percept}),
+    do: %{runner | ticked_ms: at_ms, astray: Percept.astray(percept)}
+
   defp note_tick(runner, _event), do: runner
+
+  @doc """
+  What the mission claims now. A robot that does not know where it is claims neither that it is in its place nor that all have
+  what the mission wants, and says why.
+
+      iex> runner = %{Robot.Mission.Runner.new(:mag1) | claim: %{phase: :follow, in_place: true, unsure: false}}
+      iex> Robot.Mission.Runner.claim(%{runner | astray: "two places fit: here, or 6.2,3.1"})
+      %{phase: :follow, in_place: false, unsure: true, says: "two places fit: here, or 6.2,3.1"}
+      iex> Robot.Mission.Runner.claim(runner) == runner.claim
+      true
+  """
+  @spec claim(t()) :: map()
+  def claim(%__MODULE__{claim: claim, astray: nil}), do: claim
+
+  def claim(%__MODULE__{claim: claim, astray: why}) do
+    claim = if claim[:in_place], do: %{claim | in_place: false, unsure: true}, else: claim
+    claim = if claim[:formed], do: %{claim | formed: false}, else: claim
+    Map.put(claim, :says, why)
+  end
 
   @doc "What the mission says of itself (`c:Robot.Mission.explain/1`); `[]` for one that says nothing."
   @spec explain(t()) :: [{label :: String.t(), text :: String.t()}]

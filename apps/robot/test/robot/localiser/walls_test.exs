@@ -65,21 +65,23 @@ defmodule Robot.Localiser.WallsTest do
       track = drive(2)
       {off, radius, localiser} = follow(track, Room.plan(size))
       {dead, dead_radius, _localiser} = follow(track, nil)
-      refute localiser.walls.trust.trusted?
+
+      # A plan that was right for a while may be that of another building, or the robot may have been carried away.
+      assert localiser.lost? or not localiser.walls.trust.trusted?
       assert off < dead + 0.2
       assert radius > 0.8 * dead_radius
     end
   end
 
   test "a pose that has become vague is corrected again once readings show that it was right, and no other" do
-    {_off, _radius, localiser} = follow(drive(1), Room.plan(@size))
+    {once, again} = Enum.split(drive(2), length(drive(1)))
+    {_off, _radius, localiser} = follow(once, Room.plan(@size))
 
     vague = fn pose, belief ->
       covariance = Covariance.add(belief.covariance, [9.0, 9.0, 0.01])
       %{belief | pose: pose, covariance: covariance}
     end
 
-    again = Enum.drop(drive(2), length(drive(1)))
     right = update_in(localiser.belief, &vague.(&1.pose, &1))
     {off, radius, _localiser} = follow(again, Room.plan(@size), right)
     assert off < 0.2 and radius < 0.5
@@ -128,11 +130,15 @@ defmodule Robot.Localiser.WallsTest do
           )
 
         localiser = Localiser.anchors(localiser, %Anchors{frame: frame.(sd)})
-        track |> follow(Room.plan(@size), localiser) |> elem(0)
+        {_off, radius, localiser} = follow(track, Room.plan(@size), localiser)
+        {radius, localiser.walls}
       end
 
-    assert near < 0.2
-    assert far > 0.5
+    assert {radius, %{at: %Pose{}}} = near
+    assert radius < 0.3
+    # It is as vague as the leader is.
+    assert {radius, %{at: nil}} = far
+    assert radius > 0.8
   end
 
   test "corrects nothing where robots take their places from each other" do

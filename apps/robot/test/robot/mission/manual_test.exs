@@ -36,6 +36,25 @@ defmodule Robot.Mission.ManualTest do
              Manual.handle({:outcome, next, 1}, mission)
   end
 
+  test "a robot that does not know where it is on its plan has not arrived, and says why" do
+    for {state, why} <- [
+          {:lost, "lost: a third of what it hears fits the plan"},
+          {:ambiguous, "two places fit: here, or 6.2,3.1"}
+        ] do
+      astray = %{percept(100, %{}) | uncertainty: %{radius: 0.1, place: {state, why}}}
+      {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2:1")
+      {:done, mission, _claim} = Manual.handle({:outcome, tag, 1}, mission)
+
+      assert {:given_up, mission, [{:stage, :given_up, stage}, {:claim, claim}]} =
+               Manual.handle({:tick, astray}, mission)
+
+      assert stage == %{x: 2.0, y: 1.0, blocked_by: why}
+      assert %{blocked_by: ^why, standing: true} = claim
+      # It has said it once.
+      assert {:given_up, ^mission, []} = Manual.handle({:tick, astray}, mission)
+    end
+  end
+
   test "says of a place that it may be elsewhere, if it is not sure of its pose" do
     unsure = fn radius -> %{percept(100, %{}) | uncertainty: %{radius: radius}} end
     {:goto, mission, [{:goal, tag, _} | _]} = tell(new(), "goto:2:1")
