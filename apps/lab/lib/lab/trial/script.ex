@@ -1,7 +1,8 @@
 defmodule Lab.Trial.Script do
-  @moduledoc false
-  # Describes what is done to a run and when: moves of the landmark, kills, and all other events
-  # (`Lab.Trial.Event`). Pure; times in milliseconds.
+  @moduledoc """
+  Describes what is done to a run and when: moves of the landmark, kills, and all other events
+  (`Lab.Trial.Event`). Pure; times in milliseconds.
+  """
   alias Lab.Trial.Event
 
   @enforce_keys [:pending]
