@@ -50,7 +50,7 @@ defmodule Robot.Localiser.MonteCarlo do
   @clear 8
   # A look needs so many echoes. The shares of them that fit: of one that is lost; in doubt, compared with other places; good.
   @echoes 6
-  @lost 0.35
+  @lost 0.4
   @doubtful 0.6
   @good 0.7
   # One is found at a place where so many fit.
@@ -58,8 +58,9 @@ defmodule Robot.Localiser.MonteCarlo do
   # The estimate is compared with so many random places; one is better in so many looks.
   @others 200
   @worse 2
-  # One whose place is suddenly another one is lost (metres).
+  # One whose place is suddenly another one (metres) is lost, if so many echoes say that.
   @jump 1.0
+  @surely 8
   # So many more good looks than twice the others show that the plan is right.
   @shown 8
   # A place is held after so many good looks, and another one is a rival after so many, by so much less likelihood a look (1/1024).
@@ -295,7 +296,7 @@ defmodule Robot.Localiser.MonteCarlo do
 
   defp decide(%{held: held} = filter) do
     cond do
-      filter.shown >= @shown and (held.jump > @jump or misfit?(filter)) ->
+      filter.shown >= @shown and (jumped?(held) or misfit?(filter)) ->
         %{filter | state: :lost, held: nil, search: held, rivals: [], calm: 0}
 
       held.rivals == [] or filter.shown < @shown ->
@@ -309,6 +310,9 @@ defmodule Robot.Localiser.MonteCarlo do
         %{filter | state: :ambiguous, rivals: held.rivals}
     end
   end
+
+  defp jumped?(%{jump: jump, looks: [{_fits, counting} | _]}),
+    do: jump > @jump and counting >= @surely
 
   defp misfit?(%{held: held, worse: worse}) do
     share = Population.share(held)
