@@ -163,6 +163,11 @@ defmodule Lab.Trial do
   @spec kill(t(), :leader | atom()) :: t()
   def kill(trial, who), do: %{trial | script: Script.add(trial.script, trial.at_ms, {:kill, who})}
 
+  @doc "Lifts a robot to another pose now (metres, degrees), which its wheels do not count."
+  @spec displace(t(), atom(), {x :: float(), y :: float(), degrees :: float()}) :: t()
+  def displace(trial, id, pose),
+    do: %{trial | script: Script.add(trial.script, trial.at_ms, {:displace, id, pose})}
+
   @doc "Sends a command to one living robot or to all; a frozen one does not get it."
   @spec command(t(), atom() | :all, term()) :: t()
   def command(trial, to, command), do: elem(ask(trial, to, command), 0)

@@ -11,7 +11,7 @@ defmodule Bench.Goto.Place do
   alias Robot.Percept
   alias Lab.Trial
   alias Sim.{Floorplan, World}
-  alias Lab.Trial.{Script, Setup}
+  alias Lab.Trial.Setup
   alias Swarm.Member
 
   @way_m 50.0
@@ -70,8 +70,7 @@ defmodule Bench.Goto.Place do
     trial = Trial.command(trial, kind, :wander)
     {trial, before} = look(trial, kind, @lift_ms, [])
     {x, y, turn} = place(how, setup, kind, World.truth(trial.world, kind), draws)
-    event = {:displace, kind, {x, y, 360.0 * turn}}
-    trial = %{trial | script: Script.add(trial.script, trial.at_ms, event)}
+    trial = Trial.displace(trial, kind, {x, y, 360.0 * turn})
     {_trial, samples} = look(trial, kind, @lift_ms + @after_ms, before)
     {Enum.reverse(samples), @lift_ms}
   end
