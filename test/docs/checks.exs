@@ -104,7 +104,7 @@ defmodule Docs.Checks do
     "live.mcap: 2 live robots",
     "wishes, the strongest first:",
     "   40.0 s  FAILED  {:formed, by_s: 40}",
-    "console -> sim -> missions -> swarm",
+    "console -> lab -> missions -> swarm",
     "console --> lab --> missions --> swarm",
     "Swarm.Supervisor (rest_for_one",
     "camera -> Hal.Device",

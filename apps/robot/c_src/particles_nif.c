@@ -106,7 +106,7 @@ static ERL_NIF_TERM weigh(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 
     /* A cast ends after as many steps. */
     for (size_t k = 0; k < reading_count; k++)
-        if (!(readings[k].most >= 0.0 && readings[k].most <= 100.0))
+        if (!(readings[k].most >= 0.0 && readings[k].most <= 100.0 && readings[k].most <= 2000.0 * map.cell))
             return enif_make_badarg(env);
 
     memcpy(tables, packed.data, sizeof tables);
@@ -116,6 +116,6 @@ static ERL_NIF_TERM weigh(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return result;
 }
 
-static ErlNifFunc functions[] = {{"loaded?", 0, loaded, 0}, {"move", 3, move, 0}, {"scatter", 5, scatter, 0}, {"weigh", 4, weigh, 0}};
+static ErlNifFunc functions[] = {{"loaded?", 0, loaded, 0}, {"move", 3, move, 0}, {"scatter", 5, scatter, 0}, {"weigh", 4, weigh, ERL_NIF_DIRTY_JOB_CPU_BOUND}};
 
 ERL_NIF_INIT(Elixir.Robot.Localiser.MonteCarlo.Native, functions, NULL, NULL, NULL, NULL)

@@ -182,12 +182,9 @@ defmodule Swarm do
     with {:ok, command} <- Command.parse(text, Transport.robots()), do: command(to, command)
   end
 
-  def tell(to, command) when is_tuple(command) or (is_atom(command) and command != nil),
-    do: command(to, command)
-
-  def tell(_to, other),
-    do:
-      {:error, "#{inspect(other)} is not a command; write one as text, such as \"goto:2.0:1.0\""}
+  def tell(to, term) do
+    with {:ok, command} <- Command.check(term, Transport.robots()), do: command(to, command)
+  end
 
   @doc """
   The status of all robots, one line each in `iex`; for those that do not answer, from their rows

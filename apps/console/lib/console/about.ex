@@ -7,7 +7,7 @@ defmodule Console.About do
   alias Robot.Control.Controller
   alias Lab.Trial.Setup
   alias Swarm.{Member, Status}
-  alias Swarm.Status.Sight
+  alias Swarm.Status.{Sight, Words}
 
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
@@ -39,7 +39,7 @@ defmodule Console.About do
         seen: seen(recent(entries, :detections)),
         camera: Names.whereis(robot, :view) != nil,
         pictures: nil,
-        notes: []
+        notes: claimed(recent(entries, :mission, :infinity))
       }
       |> Map.merge(
         sight(robot, entries, (recent(entries, :release, :infinity) || %{mission: nil}).mission)
@@ -73,7 +73,7 @@ defmodule Console.About do
         seen: nil,
         camera: false,
         pictures: nil,
-        notes: []
+        notes: claimed(%{claim: Member.claim(member)})
       }
       |> Map.merge(sight(id, now(percept), mission))
       |> Map.merge(wheels(percept.odometry))
@@ -142,11 +142,23 @@ defmodule Console.About do
   defp point(nil), do: nil
   defp point(%Pose{x: x, y: y}), do: [x, y]
 
+  # What its mission says to people.
+  defp claimed(%{claim: claim}) do
+    blocked_by = claim[:blocked_by]
+
+    for text <- [blocked_by && "blocked by #{blocked_by}", claim[:says]],
+        is_binary(text),
+        do: text
+  end
+
+  defp claimed(_none), do: []
+
   defp notes(status) do
     Enum.filter(
       [
         Status.arming(status),
         status.blocked_by && "blocked by #{status.blocked_by}",
+        Words.of(:says, status),
         status.network && "no network (#{status.network})",
         status.from == :row && "does not answer; this is from the blackboard"
       ],

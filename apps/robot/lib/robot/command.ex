@@ -201,6 +201,55 @@ defmodule Robot.Command do
     do: {:blob, Pose.new(x, y, theta), size, found}
 
   @doc """
+  The same for a command that is given as a term: as `parse/2` would return it, or one line that says what is allowed. Numbers
+  are not checked.
+
+      iex> Robot.Command.check({:goto, 2, 1, nil}, [:mag1])
+      {:ok, {:goto, 2, 1, nil}}
+      iex> Robot.Command.check({:follow_the_leader, :mag9}, [:mag1, :min1])
+      {:error, "followtheleader: name: expected one of mag1, min1, got :mag9"}
+      iex> Robot.Command.check(:reset, [])
+      {:error, ~s(:reset is not a command; write one as text, such as "goto:2.0:1.0")}
+  """
+  @spec check(term(), [atom()]) :: {:ok, t()} | {:error, String.t()}
+  def check(word, _known)
+      when word in [:stop, :lead, :start, :wander, :rest, :ping, :arm, :disarm, :acknowledge],
+      do: {:ok, word}
+
+  def check({word, text}, known) when word in [:start, :run] and is_binary(text),
+    do: parse("#{word}:#{text}", known)
+
+  def check({:find_blob, "" <> colour}, known), do: parse("findblob:#{colour}", known)
+  def check({:find_blob, nil} = command, _known), do: {:ok, command}
+
+  def check({:follow_the_leader, name} = command, known) do
+    if name in known,
+      do: {:ok, command},
+      else:
+        {:error,
+         "followtheleader: name: expected one of #{Enum.join(known, ", ")}, got #{inspect(name)}"}
+  end
+
+  def check(command, _known)
+      when is_tuple(command) and
+             elem(command, 0) in [
+               :move,
+               :goto,
+               :square,
+               :subscribe,
+               :unsubscribe,
+               :position,
+               :follow,
+               :blob
+             ],
+      do: {:ok, command}
+
+  def check(other, _known) do
+    other = inspect(other, limit: 5, printable_limit: 40)
+    {:error, "#{other} is not a command; write one as text, such as \"goto:2.0:1.0\""}
+  end
+
+  @doc """
   What a command is called.
 
       iex> Robot.Command.name({:move, 0.5, 0.0})

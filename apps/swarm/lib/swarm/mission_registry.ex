@@ -183,7 +183,7 @@ defmodule Swarm.MissionRegistry do
   @spec load([atom()]) :: :ok
   def load(more \\ []) do
     modules =
-      for app <- [:hal, :mesh, :robot, :swarm | more] ++ apps(),
+      for app <- [:hal, :nav, :mesh, :robot, :swarm | more] ++ apps(),
           module <- Application.spec(app, :modules) || [],
           do: module
 

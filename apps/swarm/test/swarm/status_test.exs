@@ -127,6 +127,15 @@ defmodule Swarm.StatusTest do
     assert line =~ "status_snoar"
   end
 
+  test "no escape of a row reaches a terminal" do
+    status = %Status{robot: :mag1, node: node(), by: :follow, says: "a\e[2Jb\n", age_ms: 5}
+    row = Status.Row.encode(status)
+    assert {:ok, %{says: "a [2Jb "}} = Status.Row.decode(:mag1, row, 10)
+
+    for {key, junk} <- [says: "\e[2J", state: "\e]0;x", by: "\a", limits: ["\e"], offline: ["\e"]],
+        do: assert(Status.Row.decode(:mag1, Map.put(row, key, junk), 10) == :error)
+  end
+
   test "a robot's row says what blocks it, as text of limited length" do
     status = %Status{robot: :mag1, node: node(), by: :follow, blocked_by: "mag2", age_ms: 5}
     row = Status.Row.encode(status)

@@ -7,7 +7,7 @@ defmodule Lab.Fleet.Mission do
   alias Swarm.MissionRegistry
 
   # The apps that are available in a robot's own process of the operating system.
-  @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
+  @apps [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :sim, :lab]
 
   @doc """
   The setup with that mission, and whether the mission should start; the error is one line.

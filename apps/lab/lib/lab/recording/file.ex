@@ -6,7 +6,7 @@ defmodule Lab.Recording.File do
   alias Lab.{Recording, Trial}
 
   # What a run can contain is defined in these.
-  @apps [:hal, :vision, :robot, :mesh, :swarm, :missions, :sim]
+  @apps [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :sim, :lab]
   # Robots of a run have one of these names (`Lab.Trial.Options`).
   @kinds ["mag", "min"]
   @most 100

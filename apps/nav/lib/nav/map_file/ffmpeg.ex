@@ -47,7 +47,7 @@ defmodule Nav.MapFile.Ffmpeg do
   # A file's name may begin like an option or a protocol.
   defp run(file, kind) do
     arguments =
-      ~w(-nostdin -v quiet -xerror -err_detect crccheck+explode -f #{kind}_pipe -i) ++
+      ~w(-nostdin -v quiet -timelimit 60 -max_alloc 1000000000 -xerror -err_detect crccheck+explode -f #{kind}_pipe -i) ++
         ["file:" <> file] ++ ~w(-frames:v 1 -f rawvideo -pix_fmt rgba -)
 
     case System.find_executable("ffmpeg") do

@@ -27,7 +27,7 @@ defmodule Robot.Localiser.MonteCarlo do
   alias Nav.OccupancyGrid.Cones
   alias Robot.Percept
 
-  # A look is taken after so much way or turn (metres, radians), and this often while the robot stands (ms).
+  # A look is taken after so much way or turn (metres, radians), and this often while a lost robot stands (ms).
   @moved 0.25
   @turned 0.2
   @standing_ms 2_000
@@ -206,15 +206,16 @@ defmodule Robot.Localiser.MonteCarlo do
     stood? = percept.at_ms - filter.at_ms >= @standing_ms
     moved? = Cones.moved?(filter.at, now, @moved, @turned)
 
-    if (stood? or moved?) and not blurred?(percept),
-      do: look(filter, percept, {hint, among}, moved?),
+    # The same readings again say nothing new of one place; one that searches looks for others.
+    if (moved? or (stood? and filter.search != nil)) and not blurred?(percept),
+      do: look(filter, percept, {hint, among}),
       else: filter
   end
 
   defp blurred?(%{odometry: odometry, profile: profile}),
     do: abs(odometry.twist.turn) * profile.sonar_round_s > @blurred
 
-  defp look(filter, percept, {hint, among}, moved?) do
+  defp look(filter, percept, {hint, among}) do
     {readings, counting} = Readings.pack(percept, among)
     draw = Reference.hash(filter.seed, filter.number)
     look = %{grid: percept.grid, readings: readings, counting: counting, draw: draw}
@@ -222,9 +223,7 @@ defmodule Robot.Localiser.MonteCarlo do
 
     cond do
       counting < @echoes -> filter
-      # The same readings again say nothing new of one place.
       filter.search -> filter |> draw(look, hint) |> search(look, percept)
-      not moved? -> filter |> judge(look, percept) |> decide()
       true -> filter |> draw(look, hint) |> judge(look, percept) |> decide()
     end
   end
@@ -352,7 +351,8 @@ defmodule Robot.Localiser.MonteCarlo do
       rival? ->
         %{filter | state: :ambiguous, rivals: [search.pose], calm: 0}
 
-      held.good >= @shown and filter.calm >= looks(look.grid) and filter.way >= @found_way ->
+      held.good >= @shown and filter.way >= @found_way and filter.calm >= @found and
+          filter.calm >= looks(look.grid) ->
         shown = max(filter.shown, @shown)
         %{filter | state: :tracking, search: nil, shown: shown, slow: nil, fast: nil, calm: 0}
 

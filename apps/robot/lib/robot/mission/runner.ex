@@ -114,10 +114,14 @@ defmodule Robot.Mission.Runner do
       true
   """
   @spec claim(t()) :: map()
-  def claim(%__MODULE__{claim: claim, astray: nil}), do: claim
+  def claim(%__MODULE__{claim: claim, astray: why}), do: withheld(claim, why)
 
-  def claim(%__MODULE__{claim: claim, astray: why}) do
-    claim = if claim[:in_place], do: %{claim | in_place: false, unsure: true}, else: claim
+  defp withheld(claim, nil), do: claim
+
+  defp withheld(claim, why) do
+    claim =
+      if claim[:in_place], do: Map.merge(claim, %{in_place: false, unsure: true}), else: claim
+
     claim = if claim[:formed], do: %{claim | formed: false}, else: claim
     Map.put(claim, :says, why)
   end
@@ -155,8 +159,11 @@ defmodule Robot.Mission.Runner do
   defp follow(runner, {phase, mission, effects}) when is_atom(phase) and is_list(effects) do
     runner = %{runner | phase: phase, mission: mission}
     effects = Enum.map(effects, &said(&1, runner.module))
-    {Enum.reduce(effects, runner, &note/2), effects}
+    {Enum.reduce(effects, runner, &note/2), Enum.map(effects, &told(&1, runner.astray))}
   end
+
+  defp told({:claim, claim}, why), do: {:claim, withheld(claim, why)}
+  defp told(effect, _why), do: effect
 
   defp said({:tell, to, kind, fields}, module),
     do: {:send, to, Letter.new!(module, to, kind, fields)}

@@ -122,6 +122,9 @@ defmodule Sim.World.Line do
 
       {:tcp_closed, ^socket} ->
         exit(:no_world)
+
+      _unknown ->
+        :ok
     end
 
     relay(socket)

@@ -53,8 +53,14 @@ defmodule Swarm.Status.Row do
   defp put(:thousandths, number), do: mm(number)
   defp put(:metres, metres), do: min(mm(metres), @unsure_mm)
 
-  defp put({:text, most}, "" <> text),
-    do: text |> String.codepoints() |> Enum.take(most) |> Enum.join()
+  # An escape would reach a terminal.
+  defp put({:text, most}, "" <> text) do
+    text
+    |> String.replace(~r/[[:cntrl:]]/u, " ")
+    |> String.codepoints()
+    |> Enum.take(most)
+    |> Enum.join()
+  end
 
   defp put({:text, _most}, _other), do: nil
   defp put(:arming, :disarmed), do: "disarmed"
@@ -122,9 +128,11 @@ defmodule Swarm.Status.Row do
   defp named(field, {:ok, value}), do: {:ok, [{field, value}]}
   defp named(_field, :error), do: :error
 
-  defp get(:name, "" <> text, _age_ms), do: {:ok, Codec.word(text)}
   defp get(:word, nil, _age_ms), do: {:ok, nil}
-  defp get(:word, "" <> text, _age_ms), do: {:ok, Codec.word(text)}
+
+  defp get(how, word, _age_ms) when how in [:name, :word],
+    do: if(shown?(word, @words), do: {:ok, Codec.word(word)}, else: :error)
+
   defp get(:pose, nil, _age_ms), do: {:ok, nil}
   defp get(:thousandths, nil, _age_ms), do: {:ok, nil}
   defp get(:number, number, _age_ms) when number == nil or is_number(number), do: {:ok, number}
@@ -138,12 +146,13 @@ defmodule Swarm.Status.Row do
 
   defp get(:metres, mm, _age_ms) when is_integer(mm) and mm in 0..@unsure_mm, do: {:ok, mm / 1000}
 
-  defp get({:text, most}, "" <> text, _age_ms) when byte_size(text) <= 4 * most, do: {:ok, text}
+  defp get({:text, most}, text, _age_ms),
+    do: if(shown?(text, most), do: {:ok, text}, else: :error)
 
   defp get(:hung, {what, where, ago_ms}, age_ms)
-       when what in ["silent", "hung"] and is_binary(where) and is_integer(ago_ms) and ago_ms >= 0 do
+       when what in ["silent", "hung"] and is_integer(ago_ms) and ago_ms >= 0 do
     what = if what == "silent", do: :silent, else: :hung
-    {:ok, {what, String.slice(where, 0, @words), ago_ms + age_ms}}
+    if shown?(where, @words), do: {:ok, {what, where, ago_ms + age_ms}}, else: :error
   end
 
   defp get(:words, words, _age_ms),
@@ -170,7 +179,13 @@ defmodule Swarm.Status.Row do
 
   defp get(_how, _other, _age_ms), do: :error
 
-  defp texts?(list), do: Wire.list?(list, &is_binary/1)
+  defp texts?(list), do: Wire.list?(list, &shown?(&1, 3 * @words))
+
+  # Whether it may be printed: so many characters, and no escape among them.
+  defp shown?(text, most) do
+    is_binary(text) and byte_size(text) <= 4 * most and String.printable?(text) and
+      not (text =~ ~r/[[:cntrl:]]/u)
+  end
 
   defp names(texts), do: for(text <- texts, {:ok, name} <- [Codec.robot(text)], do: name)
 end

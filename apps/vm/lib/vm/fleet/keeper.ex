@@ -35,13 +35,21 @@ defmodule Vm.Fleet.Keeper do
   def handle_call(:answer, _from, s), do: {:reply, s.answer, s}
 
   @impl GenServer
-  def handle_cast({:again, main}, s) do
-    if s.vm, do: Vm.stop(s.vm)
-    {:noreply, boot(%{s | main: main || s.main})}
+  def handle_cast({:again, main}, s), do: {:noreply, boot(%{ended(s) | main: main || s.main})}
+
+  defp ended(%{vm: nil} = s), do: s
+
+  defp ended(%{monitor: monitor} = s) do
+    Vm.stop(s.vm)
+    down = receive do: ({:DOWN, ^monitor, _, _, _} = down -> down)
+    {:noreply, s} = handle_info(down, s)
+    s
   end
 
   @impl GenServer
-  def handle_info(:boot, s), do: {:noreply, boot(s)}
+  def handle_info(:boot, %{vm: nil} = s), do: {:noreply, boot(s)}
+  # It was started meanwhile.
+  def handle_info(:boot, s), do: {:noreply, s}
 
   def handle_info({:DOWN, monitor, :process, _peer, _reason}, %{monitor: monitor} = s) do
     s = heard(s)

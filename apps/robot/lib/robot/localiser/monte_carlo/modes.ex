@@ -41,6 +41,8 @@ defmodule Robot.Localiser.MonteCarlo.Modes do
   defp find(drawn, all, found) do
     {near, far} = part(drawn, middle(drawn))
     {near, far} = if far == [], do: {near, far}, else: part(drawn, begun(drawn))
+    # The mean of a few that lie apart may be none of them.
+    {near, far} = if near == [], do: {drawn, []}, else: {near, far}
     share = count(near) / all
 
     if near != [] and (found == 0 or share >= @least),
