@@ -106,7 +106,7 @@ defmodule Convoy.MixProject do
   defp releases do
     robot =
       Keyword.new(
-        [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :agents, :mcap],
+        [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :record, :agents],
         &{&1, :permanent}
       )
 

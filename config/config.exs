@@ -21,5 +21,8 @@ config :swarm,
     teleop: Missions.Teleop
   ]
 
+# What records a robot whose file says `record:`.
+config :swarm, recorder: Record.Recorder
+
 # What a build adds of its own (docs/extending.md).
 if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

@@ -20,9 +20,14 @@ defmodule System.LayersTest do
   defp room(app, module) do
     source = to_string(module.module_info(:compile)[:source])
 
-    with [_all, rest] <- Regex.run(~r"/apps/#{app}/lib/#{app}/(.+)\.ex$", source),
-         do: rest |> String.split("/") |> hd()
+    with [_all, rest] <- Regex.run(~r"/apps/#{app}/lib/(.+)\.ex$", source),
+         do: rest |> String.split("/") |> room_of(app)
   end
+
+  # A room may have modules of its own name, such as `Mcap`, in a folder beside the app's. Its tasks for Mix are in none.
+  defp room_of([app, room | _], app), do: room
+  defp room_of([room | _], app) when room not in [app, "mix"], do: room
+  defp room_of(_others, _app), do: nil
 
   # Calls at run time.
   defp calls(module) do

@@ -17,7 +17,7 @@ defmodule Lab.MixProject do
       start_permanent: Mix.env() == :prod,
       deps: [
         {:missions, in_umbrella: true},
-        {:mcap, in_umbrella: true},
+        {:record, in_umbrella: true},
         {:sim, in_umbrella: true},
         {:vm, in_umbrella: true}
       ]

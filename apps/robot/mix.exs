@@ -22,7 +22,7 @@ defmodule Robot.MixProject do
         ]
       ],
       start_permanent: Mix.env() == :prod,
-      deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}, {:mcap, in_umbrella: true}]
+      deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}]
     ]
   end
 

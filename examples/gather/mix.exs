@@ -12,9 +12,11 @@ defmodule Gather.MixProject do
       version: "0.1.0",
       elixir: "~> 1.14",
       start_permanent: Mix.env() == :prod,
-      # The robots need `missions`; `console` has the simulator and `mix demo`, and is not part of the release.
+      # The robots need `missions`, and `record` where a file says `record:`; `console` has the simulator and `mix demo`, and is
+      # not part of the release.
       deps: [
         {:missions, path: Path.join(@apps, "missions")},
+        {:record, path: Path.join(@apps, "record")},
         {:console, path: Path.join(@apps, "console"), runtime: false}
       ],
       releases: [robot: Convoy.Release.options(applications: [gather: :permanent])]

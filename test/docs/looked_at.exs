@@ -6,7 +6,7 @@ defmodule Docs.LookedAt do
   import ExUnit.CaptureIO, only: [capture_io: 1]
   alias Docs.Sandbox
 
-  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Mcap Vm Mix)
+  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Record Mcap Vm Mix)
 
   @doc "Of a command's words."
   @spec command([String.t()], Path.t()) :: String.t() | nil
@@ -129,7 +129,20 @@ defmodule Docs.LookedAt do
   defp loaded,
     do:
       Enum.flat_map(
-        [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :agents, :sim, :lab, :mcap, :vm],
+        [
+          :hal,
+          :nav,
+          :vision,
+          :robot,
+          :mesh,
+          :swarm,
+          :missions,
+          :record,
+          :agents,
+          :sim,
+          :lab,
+          :vm
+        ],
         &Application.spec(&1, :modules)
       )
 

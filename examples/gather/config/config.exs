@@ -2,4 +2,5 @@ import Config
 
 # By name; the first is that of a robot whose file names none.
 config :swarm,
-  missions: [gather: Gather, landmark: Missions.Landmark, patrol: Missions.Patrol]
+  missions: [gather: Gather, landmark: Missions.Landmark, patrol: Missions.Patrol],
+  recorder: Record.Recorder

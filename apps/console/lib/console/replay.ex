@@ -7,7 +7,7 @@ defmodule Console.Replay do
   alias Console.Cli.{Format, Output}
   alias Console.Replay.{Asked, Difference, Guard, Moment, Options, Recording, Session, Verdict}
   alias Console.Tables
-  alias Lab.Recording.Comparison
+  alias Record.Recording.Comparison
   alias Lab.Replay.Kind
 
   # So many differences are shown; the first ones explain the others.

@@ -3,7 +3,7 @@ defmodule Console.ReplayLiveTest do
   use ExUnit.Case, async: false
   import ExUnit.CaptureIO
   alias Console.{Demo, Live, Options, Replay, Runs}
-  alias Robot.Recording
+  alias Record.Recording
   alias Lab.Replay.{Cursor, Kind}
   @moduletag :realtime
   @moduletag :tmp_dir

@@ -12,7 +12,7 @@ defmodule Lab.Recorder do
   alias Mcap.FileWriter.{Disk, Output}
   alias Mcap.Writer
   alias Hal.Frame
-  alias Lab.Recorder.Camera
+  alias Record.Camera
   alias Lab.{Recording, Trial}
   alias Lab.Recording.{Pictures, Topics}
   alias Lab.Trial.Setup

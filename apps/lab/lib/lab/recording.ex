@@ -10,10 +10,10 @@ defmodule Lab.Recording do
   | `/convoy/start` | once: the version, and the start: world, robots, mission (`Lab.Trial.Setup`) |
   | `/convoy/ticks` | each 100 ms: all inputs of the robots with their effects, and all interventions |
 
-  A tick is written in a short form (`Lab.Recording.Tick`), and without compression: that would cost
+  A tick is written in a short form (`Record.Recording.Tick`), and without compression: that would cost
   a run more than all the rest of its recording.
   """
-  alias Lab.Recording.Tick
+  alias Record.Recording.Tick
   alias Lab.Trial
   alias Lab.Trial.Setup
 
@@ -63,11 +63,8 @@ defmodule Lab.Recording do
       {:ok, {:convoy, @version, %Setup{world: %{map: map}} = setup}} ->
         {:ok, %{setup | map: map}}
 
-      {:ok, {:convoy, version, _setup}} when is_integer(version) ->
-        {:error, "is a recording of version #{version}; this program reads version #{@version}"}
-
-      _other ->
-        {:error, "begins with something that this program did not record"}
+      other ->
+        Record.Recording.refuse(other, :convoy, @version)
     end
   end
 
@@ -82,5 +79,5 @@ defmodule Lab.Recording do
     end
   end
 
-  defp read(bytes), do: Robot.Recording.read(bytes, @most_bytes)
+  defp read(bytes), do: Record.Recording.read(bytes, @most_bytes)
 end

@@ -1,6 +1,6 @@
 defmodule Lab.Replay do
   @moduledoc """
-  Replays a recorded run, tick by tick: each robot by what it was told (`Swarm.Replay`), and the
+  Replays a recorded run, tick by tick: each robot by what it was told (`Record.Replay.Member`), and the
   world by what the robots did and by interventions. Both must be as recorded. Pure.
 
   The radio is not replayed: what it delivered is among the robots' inputs. The world is: the
@@ -51,7 +51,7 @@ defmodule Lab.Replay do
   end
 
   defp entry({:step, id, input, effects}, {replay, differences}) do
-    at_ms = Swarm.Replay.at_ms(input)
+    at_ms = Record.Replay.Member.at_ms(input)
     replay = replay |> advance(at_ms) |> settle(input)
     {trial, decided} = decide(replay.trial, id, input, effects, at_ms)
     differences = decided ++ sensed(replay.trial, id, input, at_ms) ++ differences
@@ -85,7 +85,7 @@ defmodule Lab.Replay do
   defp decide(trial, id, input, recorded, at_ms) do
     case trial.members do
       %{^id => member} ->
-        {member, difference} = Swarm.Replay.step(member, input, recorded)
+        {member, difference} = Record.Replay.Member.step(member, input, recorded)
         trial = %{trial | members: %{trial.members | id => member}}
         trial = Enum.reduce(recorded, trial, &Mechanics.effect(&1, id, &2))
         {trial, for(difference <- List.wrap(difference), do: {:decision, difference})}
@@ -134,7 +134,7 @@ defmodule Lab.Replay do
     case Enum.split_while(inputs, &(not match?({:tick, _at_ms}, &1))) do
       {first, [{:tick, at_ms} | _] = decided} when member != nil ->
         member = Enum.reduce(first, member, &elem(Member.step(&2, &1), 0))
-        {at_ms, Swarm.Replay.reasons(member, Enum.take(decided, 2))}
+        {at_ms, Record.Replay.Member.reasons(member, Enum.take(decided, 2))}
 
       _dead_or_frozen ->
         nil

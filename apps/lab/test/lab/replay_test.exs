@@ -1,8 +1,7 @@
 defmodule Lab.ReplayTest do
   use Lab.LockstepCase, async: true
   alias Lab.{Recording, Replay, Trial}
-  doctest Lab.Recording.Comparison
-  doctest Lab.Recording.Tick
+  alias Record.Recording.Comparison
 
   @robots [:mag1, :mag2, :mag3, :min1]
 
@@ -111,8 +110,8 @@ defmodule Lab.ReplayTest do
   test "two runs part where one has another event" do
     {_setup, one, _trial} = record([blobs: :direct], 60)
     {_setup, other, _trial} = record([blobs: :direct, script: [{3, {:estop, :mag3}}]], 60)
-    assert Recording.Comparison.first(one, one) == {:same, 6_000}
-    assert {:differs, %{at_ms: 3_100, entries: entries}} = Recording.Comparison.first(one, other)
+    assert Comparison.first(one, one) == {:same, 6_000}
+    assert {:differs, %{at_ms: 3_100, entries: entries}} = Comparison.first(one, other)
     assert {{:step, :mag1, _input, _effects}, {:world, 3_000, {:estop, :mag3}}} = entries
   end
 

@@ -1,7 +1,7 @@
 defmodule Robot.Trace do
   @moduledoc """
   Records the inputs and effects of a robot's processes, so that the same inputs can be fed to the
-  pure functions behind them, and the outputs compared (`Robot.Replay`).
+  pure functions behind them, and the outputs compared (`Record.Replay`).
 
   The config's `:trace` is called as `apply(m, f, a ++ [{role, kind, what, at_ms}])`, in the
   process of that role. The inputs (`:input`) are those of `Robot.Role`, the effects (`:effect`) those that

@@ -3,6 +3,7 @@ defmodule Robot.FileTest do
 
   doctest Robot.File
   doctest Robot.File.Reader
+  doctest Robot.File.RecordOptions
   doctest Robot.File.Summary
   doctest Robot.File.Terms
 

@@ -5,7 +5,7 @@ defmodule Robot.Case do
   """
   use ExUnit.CaseTemplate
   alias Hal.Twist
-  alias Robot.{Names, Replay}
+  alias Robot.Names
 
   using do
     quote do
@@ -32,21 +32,6 @@ defmodule Robot.Case do
     ]
     |> Keyword.merge(options)
     |> Robot.Config.new!()
-  end
-
-  @doc "Replays all entries of a recording, with what was compared and all differences found."
-  @spec replay(Robot.Recording.File.t()) :: {Replay.t(), [Replay.difference()]}
-  def replay(file) do
-    {replay, differences} =
-      file
-      |> Robot.Recording.File.entries()
-      |> Enum.reduce({Replay.new(), []}, fn entry, {replay, differences} ->
-        {replay, difference} = Replay.step(replay, entry)
-        {replay, List.wrap(difference) ++ differences}
-      end)
-
-    {replay, last} = Replay.finish(replay)
-    {replay, Enum.reverse(differences) ++ last}
   end
 
   @doc "A running robot, whose base has reported if it is the usual fake; it ends with the test."

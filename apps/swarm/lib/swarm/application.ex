@@ -19,7 +19,8 @@ defmodule Swarm.Application do
 
     with {:ok, robot} <- robot(Application.get_env(:swarm, :boot, false), environment),
          {:ok, mesh} <- mesh(Application.get_env(:swarm, :mesh, false), robot),
-         machine = machine(robot, environment) ++ recorder(robot),
+         {:ok, recorder} <- recorder(robot),
+         machine = machine(robot, environment) ++ recorder,
          {:ok, supervisor} <- Swarm.Supervisor.start_link(mesh ++ machine),
          :ok <- begin(robot) do
       {:ok, supervisor}
@@ -73,10 +74,12 @@ defmodule Swarm.Application do
     end
   end
 
-  defp recorder({file, _config}),
-    do: for(recorder <- List.wrap(MemberSpec.recorder(file)), do: {:recorder, recorder})
+  defp recorder({file, _config}) do
+    with {:ok, recorder} <- MemberSpec.recorder(file),
+         do: {:ok, for(recorder <- List.wrap(recorder), do: {:recorder, recorder})}
+  end
 
-  defp recorder(_none), do: []
+  defp recorder(_none), do: {:ok, []}
 
   defp begin({_file, config}) do
     with {:ok, _robot} <- Robot.Fleet.start_robot(Robot.Fleet, config, :permanent) do

@@ -8,7 +8,7 @@ defmodule Swarm.MemberSpec do
       {:ok, _pid} = Robot.Fleet.start_robot(Robot.Fleet, config, :permanent)
   """
   alias Hal.Options.{Type, Wording}
-  alias Robot.File.Terms
+  alias Robot.File.{RecordOptions, Terms}
   alias Swarm.{Comms, MissionRegistry}
 
   @doc """
@@ -77,19 +77,42 @@ defmodule Swarm.MemberSpec do
   @spec config(Robot.File.t()) :: {:ok, Robot.Config.t()} | {:error, line :: String.t()}
   def config(%Robot.File{} = file) do
     with {:ok, mission} <- mission(file.policies),
+         {:ok, recorder} <- recorder(file),
          {:ok, config} <- Robot.File.config(file) do
-      {:ok, file.record |> recorded(config) |> Map.put(:mission, mission) |> Comms.join()}
+      {:ok, config |> recorded(recorder) |> Map.put(:mission, mission) |> Comms.join()}
     end
   end
 
-  # Its recorder is a part of the node (`recorder/1`).
-  defp recorded(nil, config), do: config
-  defp recorded(_options, config), do: Robot.Recorder.join(config)
+  defp recorded(config, nil), do: config
 
-  @doc "The robot's recorder for `Swarm.Supervisor`; `nil` if it is not recorded."
-  @spec recorder(Robot.File.t()) :: {robot :: atom(), keyword()} | nil
-  def recorder(%Robot.File{record: nil}), do: nil
-  def recorder(%Robot.File{id: id, record: options}), do: {id, options}
+  defp recorded(config, {recorder, {id, _options}}),
+    do: %{config | trace: {recorder, :trace, [id]}}
+
+  @doc """
+  The robot's recorder, a part of the node, as a child of `Swarm.Supervisor`; `nil` if it is not recorded. The configuration
+  names the module, which lives in an app above this one, and to which the robot's processes hand their trace
+  (`t:Robot.Trace.entry/0`):
+
+      config :swarm, recorder: Record.Recorder
+  """
+  @spec recorder(Robot.File.t()) ::
+          {:ok, {module(), {robot :: atom(), keyword()}} | nil} | {:error, line :: String.t()}
+  def recorder(%Robot.File{record: nil}), do: {:ok, nil}
+
+  def recorder(%Robot.File{id: id, record: options}) do
+    module = Application.get_env(:swarm, :recorder)
+
+    cond do
+      module == nil ->
+        {:error, "record: no recorder is configured (config :swarm, recorder: …)"}
+
+      not Code.ensure_loaded?(module) ->
+        {:error, "record: #{inspect(module)} is configured, but not part of this release"}
+
+      true ->
+        with {:ok, all} <- RecordOptions.check(options), do: {:ok, {module, {id, all}}}
+    end
+  end
 
   @doc "The options of the node's mesh (`Mesh.Options`) that the file gives."
   @spec mesh(Robot.File.t()) :: keyword()

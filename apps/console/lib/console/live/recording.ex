@@ -1,6 +1,6 @@
 defmodule Console.Live.Recording do
   @moduledoc false
-  # Records a live demo into one file: robots that are processes (`Robot.Recorder`), or a run in
+  # Records a live demo into one file: robots that are processes (`Record.Recorder`), or a run in
   # lockstep that is watched (`Lab.Recorder`).
   alias Console.Cli.Output
   alias Console.Options
@@ -24,7 +24,7 @@ defmodule Console.Live.Recording do
       try do
         case opened(recorder) do
           :ok ->
-            status = play.(%{options | record: nil, trace: {Robot.Recorder, :trace, []}})
+            status = play.(%{options | record: nil, trace: {Record.Recorder, :trace, []}})
             recorder |> finished() |> told(options, status)
 
           {:error, line} ->
@@ -58,7 +58,7 @@ defmodule Console.Live.Recording do
   end
 
   defp recorder(options) do
-    Robot.Recorder.start_link(
+    Record.Recorder.start_link(
       robots: options.robots,
       file: [path: options.record],
       pictures: options.record_pictures
@@ -77,15 +77,15 @@ defmodule Console.Live.Recording do
   end
 
   defp opened(recorder) do
-    case Robot.Recorder.status(recorder) do
+    case Record.Recorder.status(recorder) do
       %{failed: nil} -> :ok
       %{failed: line} -> {:error, line}
     end
   end
 
   defp finished(recorder) do
-    %{lost: lost} = Robot.Recorder.status(recorder)
-    with :ok <- Robot.Recorder.close(recorder), do: {:ok, lost}
+    %{lost: lost} = Record.Recorder.status(recorder)
+    with :ok <- Record.Recorder.close(recorder), do: {:ok, lost}
   catch
     :exit, _reason -> {:error, "the recorder has ended before the run; what it has written stays"}
   end

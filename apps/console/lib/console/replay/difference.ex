@@ -27,7 +27,7 @@ defmodule Console.Replay.Difference do
     do: ["#{at(at_ms)} #{robot} was told something, but is not there"]
 
   @doc "Where two recordings part."
-  @spec parted(Lab.Recording.Comparison.difference()) :: [String.t()]
+  @spec parted(Record.Recording.Comparison.difference()) :: [String.t()]
   def parted(%{at_ms: at_ms, entries: {one, other}}) do
     ["The two part in the tick that ends at #{at(at_ms)}:", "  one:   #{entry(one)}"] ++
       ["  other: #{entry(other)}"] ++ detail(one, other)
@@ -37,7 +37,7 @@ defmodule Console.Replay.Difference do
   defp entry({:world, at_ms, event}), do: "#{at(at_ms)} world: #{brief(event)}"
 
   defp entry({:step, robot, input, effects}),
-    do: "#{at(Swarm.Replay.at_ms(input))} #{robot} on #{brief(input)}: #{brief(effects)}"
+    do: "#{at(Record.Replay.Member.at_ms(input))} #{robot} on #{brief(input)}: #{brief(effects)}"
 
   defp entry({robot, {role, kind, what, at_ms}}),
     do: "#{at(at_ms)} #{robot}, #{role}, #{kind}: #{brief(what)}"

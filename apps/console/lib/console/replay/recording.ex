@@ -3,7 +3,7 @@ defmodule Console.Replay.Recording do
   # Opens the recording that `mix replay` is about: of a run in lockstep, or of robots of processes.
   alias Console.Cli.Format
   alias Console.Replay.Guard
-  alias Robot.Recording, as: Robots
+  alias Record.Recording, as: Robots
   alias Lab.Replay.Kind
 
   @enforce_keys [:file, :about, :from, :options, :begin]

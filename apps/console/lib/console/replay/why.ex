@@ -1,12 +1,12 @@
 defmodule Console.Replay.Why do
-  @moduledoc "Explains to people why a robot did what it did at one tick (`t:Swarm.Replay.reasons/0`). Pure."
+  @moduledoc "Explains to people why a robot did what it did at one tick (`t:Record.Replay.Member.reasons/0`). Pure."
   alias Console.Cli.Format
   alias Hal.{Pose, Twist}
   alias Robot.{Percept, Wish}
-  alias Robot.Recording.Topics
+  alias Record.Recording.Topics
 
   @doc "The reasons of a robot at a time in seconds, line by line."
-  @spec lines(atom(), number(), Swarm.Replay.reasons()) :: [String.t()]
+  @spec lines(atom(), number(), Record.Replay.Member.reasons()) :: [String.t()]
   def lines(robot, at_s, reasons) do
     ["#{robot} at #{Format.decimals(at_s, 1)} s"] ++
       section("perceived", percept(reasons.percept)) ++

@@ -2,7 +2,7 @@ defmodule Lab.Recording.Drawing do
   @moduledoc "Draws a run's scene for Foxglove and other viewers of its schemas. Pure."
   alias Mcap.Foxglove
   alias Mcap.Foxglove.Scene, as: Bodies
-  alias Robot.Recording.Drawing
+  alias Record.Recording.Drawing
   alias Sim.{Floorplan, Scene}
 
   @frame "map"

@@ -2,7 +2,7 @@ defmodule Lab.Recording.Facts do
   @moduledoc "Describes what a recording says of a run in words and numbers, for plots and logs. Pure."
   alias Hal.{Json, Pose, Twist}
   alias Mcap.Foxglove
-  alias Robot.Recording.Drawing
+  alias Record.Recording.Drawing
   alias Sim.Scene
   alias Swarm.Message
 

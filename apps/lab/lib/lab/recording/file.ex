@@ -73,7 +73,7 @@ defmodule Lab.Recording.File do
     do: "was cut before its start was written: nothing of it can be replayed"
 
   defp without(%{channels: channels}, topic) do
-    {live, _trace, _encoding} = Robot.Recording.topics()
+    {live, _trace, _encoding} = Record.Recording.topics()
 
     if Enum.any?(channels, &(&1.topic == live)),
       do:

@@ -23,6 +23,7 @@ defmodule Lab.Recording.Topics do
   alias Sim.Scene
   alias Lab.Recording.{Drawing, Facts}
   alias Lab.Trial.Setup
+  alias Record.Recording.Topics, as: Shared
 
   @robots_ms 500
   @scene_ms 1_000
@@ -52,17 +53,16 @@ defmodule Lab.Recording.Topics do
   def open(writer, setup, pictures? \\ false) do
     {start, ticks, encoding} = Recording.topics()
     kinds = [:pose, :state, :blobs] ++ if(pictures?, do: [:camera, :boxes], else: [])
-    of_robots = for robot <- setup.robots, what <- kinds, do: {robot.id, what}
+    of_robots = for robot <- setup.robots, what <- kinds, do: Shared.of_robot(robot.id, what)
 
     topics =
-      for(topic <- [start, ticks], do: {topic, topic, encoding, nil}) ++
-        for({topic, schema} <- Enum.sort(@schemas), do: {topic, topic, "json", schema}) ++
-        for(topic <- ["/mission", "/messages"], do: {topic, topic, "json", nil}) ++
-        for {id, what} = key <- of_robots, do: {key, "/#{id}/#{name(what)}", "json", schema(what)}
+      for({topic, name} <- Enum.sort(@schemas), do: {topic, topic, Foxglove.schema(name)}) ++
+        for(topic <- ["/mission", "/messages"], do: {topic, topic, nil}) ++ of_robots
 
     {channels, writer} =
-      Enum.map_reduce(topics, writer, fn {key, topic, encoding, schema}, writer ->
-        schema = schema && Foxglove.schema(schema)
+      (for(topic <- [start, ticks], do: {topic, topic, encoding, nil}) ++
+         for({key, topic, schema} <- topics, do: {key, topic, "json", schema}))
+      |> Enum.map_reduce(writer, fn {key, topic, encoding, schema}, writer ->
         {id, writer} = Writer.channel(writer, topic, encoding, schema)
         {{key, id}, writer}
       end)
@@ -72,14 +72,6 @@ defmodule Lab.Recording.Topics do
     {writer, bytes} = write(topics, writer, 0, first)
     {topics, writer, bytes}
   end
-
-  defp name(:boxes), do: "camera/blobs"
-  defp name(what), do: what
-
-  defp schema(:pose), do: "foxglove.PoseInFrame"
-  defp schema(:camera), do: "foxglove.CompressedImage"
-  defp schema(:boxes), do: "foxglove.ImageAnnotations"
-  defp schema(_plain), do: nil
 
   @typedoc "A tick for the recorder: what a replay needs, as bytes, and what viewers show."
   @type tick :: {at_ms :: non_neg_integer(), ticks :: binary(), Facts.t()}
@@ -131,7 +123,7 @@ defmodule Lab.Recording.Topics do
   defp picture({id, picture}, seen) do
     [{{id, :camera}, picture}] ++
       for {^id, seen} <- seen,
-          do: {{id, :boxes}, Robot.Recording.Drawing.boxes(seen.at_ms * 1_000_000, seen)}
+          do: {{id, :boxes}, Record.Recording.Drawing.boxes(seen.at_ms * 1_000_000, seen)}
   end
 
   defp write(topics, writer, ns, messages) do

@@ -35,7 +35,7 @@ defmodule Lab.Replay.Kind do
   the readings of the sensors were compared, too.
   """
   @type compared :: %{
-          parts: [{{robot :: atom(), role :: atom()}, Robot.Replay.counts()}],
+          parts: [{{robot :: atom(), role :: atom()}, Record.Replay.counts()}],
           inputs: non_neg_integer(),
           decisions: non_neg_integer(),
           lost: non_neg_integer(),
@@ -62,7 +62,7 @@ defmodule Lab.Replay.Kind do
   @callback scene(t()) :: Scene.t()
   @doc "Why a robot decided what it decided last, with the time; `before` and `tick` are what led to this replay."
   @callback reasons(t(), before :: t(), tick(), robot :: atom()) ::
-              {at_ms :: integer(), Swarm.Replay.reasons()} | nil
+              {at_ms :: integer(), Record.Replay.Member.reasons()} | nil
   @doc "What a robot does, beside what the scene shows."
   @callback doing(t(), robot :: atom()) :: doing()
   @doc "What was compared so far."

@@ -1,6 +1,6 @@
 defmodule Lab.Replay.Robots do
   @moduledoc """
-  Replays a recording of robots of processes, tick by tick: whether their roles decide the same again (`Robot.Replay`), and
+  Replays a recording of robots of processes, tick by tick: whether their roles decide the same again (`Record.Replay`), and
   how the fleet stands by what its robots say. Pure if the missions are.
 
   No robot knows the truth: poses are those that each believes, and there is no map and no error of a formation.
@@ -8,9 +8,9 @@ defmodule Lab.Replay.Robots do
   """
   @behaviour Lab.Replay.Kind
   alias Robot.Percept
-  alias Robot.Recording
-  alias Robot.Recording.Topics
-  alias Robot.Replay.Moment
+  alias Record.Recording
+  alias Record.Recording.Topics
+  alias Record.Replay.Moment
   alias Sim.Scene
   alias Lab.Trial.{Evaluation, RunLog}
   alias Swarm.EStop.State
@@ -21,13 +21,13 @@ defmodule Lab.Replay.Robots do
 
   @enforce_keys [:shifts, :only]
   defstruct @enforce_keys ++
-              [replay: Robot.Replay.new(), run_log: %RunLog{}, robots: %{}, at_ms: 0]
+              [replay: Record.Replay.new(), run_log: %RunLog{}, robots: %{}, at_ms: 0]
 
   @typedoc "`shifts` are added to a robot's time for that since the start; `only` is the one robot that is compared."
   @type t :: %__MODULE__{
           shifts: %{atom() => integer()},
           only: String.t() | nil,
-          replay: Robot.Replay.t(),
+          replay: Record.Replay.t(),
           run_log: RunLog.t(),
           robots: %{atom() => map()},
           at_ms: non_neg_integer()
@@ -55,7 +55,7 @@ defmodule Lab.Replay.Robots do
   defp entry({id, entry}, {replay, found}) do
     {compared, difference} =
       if replay.only in [nil, Atom.to_string(id)],
-        do: Robot.Replay.step(replay.replay, {id, entry}),
+        do: Record.Replay.step(replay.replay, {id, entry}),
         else: {replay.replay, nil}
 
     found = for(difference <- List.wrap(difference), do: decision(replay, difference)) ++ found
@@ -118,7 +118,7 @@ defmodule Lab.Replay.Robots do
   defp claim(replay, id) do
     robot = replay.robots[id]
 
-    case Robot.Replay.state(replay.replay, id, :estop) do
+    case Record.Replay.state(replay.replay, id, :estop) do
       %{stop: %State{held: [_ | _]} = stop} -> Map.put(robot.claim, :estop, State.callers(stop))
       _free -> robot.claim
     end
@@ -126,7 +126,7 @@ defmodule Lab.Replay.Robots do
 
   @impl Lab.Replay.Kind
   def finish(%__MODULE__{} = replay) do
-    {compared, found} = Robot.Replay.finish(replay.replay)
+    {compared, found} = Record.Replay.finish(replay.replay)
     {%{replay | replay: compared}, Enum.map(found, &decision(replay, &1))}
   end
 
@@ -170,7 +170,7 @@ defmodule Lab.Replay.Robots do
 
   @impl Lab.Replay.Kind
   def reasons(%__MODULE__{replay: replay} = all, _before, _tick, id) do
-    with %Moment{} = moment <- Robot.Replay.moment(replay, id),
+    with %Moment{} = moment <- Record.Replay.moment(replay, id),
          %{} = reasons <- Moment.reasons(moment),
          do: {since(all, id, moment.at_ms), reasons}
   end
@@ -183,7 +183,7 @@ defmodule Lab.Replay.Robots do
 
   @impl Lab.Replay.Kind
   def compared(%__MODULE__{replay: replay}) do
-    parts = Robot.Replay.counts(replay)
+    parts = Record.Replay.counts(replay)
     sum = fn what -> parts |> Enum.map(fn {_part, counts} -> counts[what] end) |> Enum.sum() end
 
     for what <- [:inputs, :decisions, :lost, :skipped],

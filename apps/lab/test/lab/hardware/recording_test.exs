@@ -5,7 +5,7 @@ defmodule Lab.Hardware.RecordingTest do
   """
   use ExUnit.Case, async: false
   import Swarm.Case, only: [eventually: 1, order: 1]
-  alias Robot.{Recorder, Recording, Replay}
+  alias Record.{Recorder, Recording, Replay}
   alias Lab.Fleet
   @moduletag :realtime
   @moduletag :capture_log
@@ -39,7 +39,7 @@ defmodule Lab.Hardware.RecordingTest do
 
     {:ok, file} = Recording.File.open(path)
     assert file.whole?
-    {replay, differences} = Robot.Case.replay(file)
+    {replay, differences} = Record.Replayed.replay(file)
     assert differences == []
     counts = Replay.counts(replay)
     assert length(counts) == 8

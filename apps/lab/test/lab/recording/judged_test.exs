@@ -47,9 +47,10 @@ defmodule Lab.Recording.JudgedTest do
   defp live(path) do
     {:ok, _apps} = Application.ensure_all_started(:swarm)
 
-    {:ok, recorder} = Robot.Recorder.start_link(robots: @robots, file: [path: path], pictures: 5)
+    {:ok, recorder} = Record.Recorder.start_link(robots: @robots, file: [path: path], pictures: 5)
 
-    {:ok, fleet} = Fleet.start_link(robots: @robots, seed: 1, trace: {Robot.Recorder, :trace, []})
+    {:ok, fleet} =
+      Fleet.start_link(robots: @robots, seed: 1, trace: {Record.Recorder, :trace, []})
 
     # Until there are pictures of both.
     eventually(fn ->
@@ -58,7 +59,7 @@ defmodule Lab.Recording.JudgedTest do
     end)
 
     Fleet.stop(fleet)
-    :ok = Robot.Recorder.close(recorder)
+    :ok = Record.Recorder.close(recorder)
   end
 
   defp messages(path, topic) do
@@ -137,8 +138,8 @@ defmodule Lab.Recording.JudgedTest do
       assert at(message, "kind") in ~w(round heartbeat place relay)
     end
 
-    {:ok, file} = Robot.Recording.File.open(context.live)
-    assert {_replay, []} = Robot.Case.replay(file)
+    {:ok, file} = Record.Recording.File.open(context.live)
+    assert {_replay, []} = Record.Replayed.replay(file)
   end
 
   @tag Judges.tag(:python)

@@ -6,7 +6,7 @@ defmodule Robot.File.Schema do
   alias Hal.{Pose, Profile}
   alias Hal.Options.Type
   alias Hal.RFlex.PowerSwitch
-  alias Robot.File.{Colours, Device}
+  alias Robot.File.{Colours, Device, RecordOptions}
   alias Robot.Fence
 
   @farthest 10_000
@@ -48,7 +48,7 @@ defmodule Robot.File.Schema do
      replace: {:one_of, [false, true]},
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
-     record: {:or, nil, {:keys, Robot.Recorder.Options.table()}},
+     record: {:or, nil, {:keys, RecordOptions.table()}},
      network: extension(:network, context.tables),
      policies: extension(:policies, context.tables)}
   end

@@ -4,8 +4,8 @@ defmodule Robot.File.Summary do
   `report/4` looks for device files and a folder unless told how.
   """
   alias Hal.{Pose, Profile}
-  alias Robot.Recorder
-  alias Robot.File.{Device, Warnings}
+
+  alias Robot.File.{Device, RecordOptions, Warnings}
 
   @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
   @weights %{magellan: 20, atrv_mini: 40}
@@ -27,7 +27,7 @@ defmodule Robot.File.Summary do
         path,
         %Robot.File{} = robot,
         there? \\ &File.exists?/1,
-        writable? \\ &Robot.Recorder.Options.writable?/1
+        writable? \\ &RecordOptions.writable?/1
       ) do
     odd = Warnings.lines(robot, there?, &kind/1) ++ unwritable(robot.record, writable?)
 
@@ -146,7 +146,7 @@ defmodule Robot.File.Summary do
   defp recording(nil), do: nil
 
   defp recording(options) do
-    {:ok, all} = Recorder.Options.check(options)
+    {:ok, all} = RecordOptions.check(options)
     pictures = if all[:pictures], do: ", with #{all[:pictures]} pictures a second", else: ""
     "the newest #{all[:limit_mb]} MB in #{all[:folder]}, for mix replay#{pictures}"
   end

@@ -154,11 +154,13 @@ defmodule Swarm.Host.ReleaseBoot do
   end
 
   # This VM runs without the release's settings, because they would include those of the start.
-  # The missions and formations that a robot file may name are settings of the build.
+  # The missions, the formations and the recorder that a robot file may ask for are settings of the build.
   defp configure(environment) do
     with %{"RELEASE_ROOT" => root, "RELEASE_VSN" => version} <- environment,
          {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])) do
-      words = settings |> Keyword.get(:swarm, []) |> Keyword.take([:missions, :formations])
+      words =
+        settings |> Keyword.get(:swarm, []) |> Keyword.take([:missions, :formations, :recorder])
+
       Application.put_all_env(swarm: words)
     end
   end
