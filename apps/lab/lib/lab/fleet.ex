@@ -46,7 +46,7 @@ defmodule Lab.Fleet do
          :ok <- free(setup.options.robots) do
       {:ok, _apps} = Application.ensure_all_started(:swarm)
       # Else a hundred robots ask for them one by one, each in a callback of its mission.
-      :ok = Swarm.MissionRegistry.load([:vision, :sim, :lab])
+      :ok = Swarm.MissionRegistry.load(:lab)
       answer = make_ref()
       start = {setup, backend, Map.put(own, :mission, begin?), {self(), answer}}
 

@@ -3,6 +3,7 @@ defmodule Missions.NamedTest do
   use ExUnit.Case, async: false
   alias Swarm.MissionRegistry
   alias Swarm.MissionRegistry.Text
+  doctest MissionRegistry
 
   defmodule Tabled do
     @moduledoc "A mission that has a table of options, and nothing that checks them."

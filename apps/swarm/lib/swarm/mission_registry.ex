@@ -177,18 +177,35 @@ defmodule Swarm.MissionRegistry do
   end
 
   @doc """
-  Loads all modules of a robot and of these apps. Without a release the VM loads each at its first call, and the atoms in it
-  are unknown until then.
+  Loads all modules of an app, of the missions' apps, and of those that they depend on (`parts/1`). Without a release the VM
+  loads each at its first call, and the atoms in it are unknown until then.
   """
-  @spec load([atom()]) :: :ok
-  def load(more \\ []) do
+  @spec load(app :: atom()) :: :ok
+  def load(app \\ :swarm) do
     modules =
-      for app <- [:hal, :nav, :mesh, :robot, :swarm | more] ++ apps(),
+      for app <- parts([app | apps()]),
           module <- Application.spec(app, :modules) || [],
           do: module
 
     # Together, because the VM then brings them in at once, in a quarter of the time.
     :code.ensure_modules_loaded(modules)
+  end
+
+  @doc """
+  These applications and all that they depend on, each behind its own; only those that stand on `hal`, as all that know
+  robots do.
+
+      iex> Swarm.MissionRegistry.parts([:robot, :stdlib])
+      [:hal, :nav, :vision, :robot]
+  """
+  @spec parts([atom()]) :: [atom()]
+  def parts(apps), do: Enum.reduce(apps, [], &part/2)
+
+  defp part(app, found) do
+    _loaded_or_not = Application.load(app)
+    below = app |> Application.spec(:applications) |> List.wrap() |> parts()
+    own = if app == :hal or :hal in below, do: below ++ [app], else: []
+    found ++ (own -- found)
   end
 
   @doc "The applications that contain these missions, loaded."

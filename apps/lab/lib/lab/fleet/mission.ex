@@ -6,9 +6,6 @@ defmodule Lab.Fleet.Mission do
   alias Lab.Trial.Setup
   alias Swarm.MissionRegistry
 
-  # The apps that are available in a robot's own process of the operating system.
-  @apps [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :sim, :lab]
-
   @doc """
   The setup with that mission, and whether the mission should start; the error is one line.
 
@@ -39,10 +36,10 @@ defmodule Lab.Fleet.Mission do
       not mission?(module) ->
         {:error, "mission: expected a Robot.Mission (init/2 and handle/2), got #{brief(mission)}"}
 
-      nodes? and Application.get_application(module) not in @apps ->
+      nodes? and Application.get_application(module) not in MissionRegistry.parts([:lab]) ->
         {:error,
-         "mission: expected a module of #{Enum.join(@apps, ", ")}, as processes of their own have only " <>
-           "these, got #{brief(mission)}"}
+         "mission: expected a module of #{Enum.join(MissionRegistry.parts([:lab]), ", ")}, as processes of their " <>
+           "own have only these, got #{brief(mission)}"}
 
       true ->
         {:ok, %{setup | mission: mission}, true}

@@ -5,8 +5,6 @@ defmodule Lab.Recording.File do
   """
   alias Lab.{Recording, Trial}
 
-  # What a run can contain is defined in these.
-  @apps [:hal, :nav, :vision, :robot, :mesh, :swarm, :missions, :sim, :lab]
   # Robots of a run have one of these names (`Lab.Trial.Options`).
   @kinds ["mag", "min"]
   @most 100
@@ -88,12 +86,6 @@ defmodule Lab.Recording.File do
   @spec know() :: :ok
   def know do
     _names = for kind <- @kinds, number <- 1..@most, do: :"#{kind}#{number}"
-
-    for app <- @apps,
-        _loaded_or_not = Application.load(app),
-        module <- Application.spec(app, :modules) || [],
-        do: Code.ensure_loaded(module)
-
-    :ok
+    Swarm.MissionRegistry.load(:lab)
   end
 end
