@@ -87,12 +87,12 @@ defmodule Convoy.MixProject do
   defp relative(file, "."), do: file
   defp relative(file, folder), do: String.replace_prefix(file, folder <> "/", "")
 
-  # With CONVOY_BUILD=robot, say, only what that release holds is built; with CONVOY_BUILD=demo all but the benchmarks, as
+  # With CONVOY_BUILD=robot, say, only what that release holds is built; with CONVOY_BUILD=demo all but the tools, as
   # bin/build does it; else all apps are.
   defp apps("demo") do
     for mix <- Enum.sort(Path.wildcard("apps/*/mix.exs")),
         app = mix |> Path.dirname() |> Path.basename(),
-        app != "bench",
+        app != "tools",
         do: String.to_atom(app)
   end
 
@@ -102,7 +102,7 @@ defmodule Convoy.MixProject do
   end
 
   # `robot` is for real hardware; `fleet` holds robots, worlds and the view of people. Both have ssl, for
-  # distribution by TLS (rel/env.sh.eex). Neither has benchmarks.
+  # distribution by TLS (rel/env.sh.eex). Neither has the tools.
   defp releases do
     robot =
       Keyword.new(

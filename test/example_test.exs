@@ -47,7 +47,10 @@ defmodule System.ExampleTest do
 
     assert said =~ ~r/^ +drive +Gather.DeskBase$/m
     assert said =~ ~r/^ +mission +gather, radius 1.0$/m
-    refute File.exists?(Path.join(folder, "_build/prod/rel/robot/lib/sim-0.1.0"))
+    assert File.exists?(Path.join(folder, "_build/prod/rel/robot/lib/record-0.1.0"))
+
+    for app <- ~w(sim tools),
+        do: refute(File.exists?(Path.join(folder, "_build/prod/rel/robot/lib/#{app}-0.1.0")))
   end
 
   # What a line prints on both ways; its status is looked at.

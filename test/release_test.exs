@@ -87,8 +87,8 @@ defmodule System.ReleaseTest do
 
   test "it is lean, and its programs may be run" do
     apps = for path <- File.ls!(Path.join(release(), "lib")), do: hd(String.split(path, "-"))
-    for app <- ~w(hal vision robot mesh swarm missions agents), do: assert(app in apps)
-    for app <- ~w(sim console bench vm), do: refute(app in apps)
+    for app <- ~w(hal vision robot mesh swarm missions record agents), do: assert(app in apps)
+    for app <- ~w(sim console tools vm), do: refute(app in apps)
     for app <- ~w(sim console mix ex_unit), do: refute(app in apps)
 
     for {name, mode} <- [

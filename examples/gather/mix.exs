@@ -12,12 +12,12 @@ defmodule Gather.MixProject do
       version: "0.1.0",
       elixir: "~> 1.14",
       start_permanent: Mix.env() == :prod,
-      # The robots need `missions`, and `record` where a file says `record:`; `console` has the simulator and `mix demo`, and is
-      # not part of the release.
+      # The robots need `missions`, and `record` where a file says `record:`; `tools` has the simulator, `mix demo`, `mix replay`
+      # and the rest, and is not part of the release.
       deps: [
         {:missions, path: Path.join(@apps, "missions")},
         {:record, path: Path.join(@apps, "record")},
-        {:console, path: Path.join(@apps, "console"), runtime: false}
+        {:tools, path: Path.join(@apps, "tools"), runtime: false}
       ],
       releases: [robot: Convoy.Release.options(applications: [gather: :permanent])]
     ]

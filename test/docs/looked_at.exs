@@ -6,7 +6,7 @@ defmodule Docs.LookedAt do
   import ExUnit.CaptureIO, only: [capture_io: 1]
   alias Docs.Sandbox
 
-  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Record Mcap Vm Mix)
+  @ours ~w(Hal Vision Robot Mesh Swarm Missions Sim Console Record Mcap Tools Vm Mix)
 
   @doc "Of a command's words."
   @spec command([String.t()], Path.t()) :: String.t() | nil

@@ -2,7 +2,7 @@ defmodule Console.ChaosTest do
   # It captures what goes to stderr, which is one device for all tests.
   use ExUnit.Case, async: false
   import ExUnit.CaptureIO
-  alias Console.Chaos
+  alias Console.{Chaos, Runs}
   alias Console.Chaos.{Options, Report}
   alias Console.Scenario
   alias Console.Scenario.Session
@@ -129,8 +129,7 @@ defmodule Console.ChaosTest do
       # What the run was when it was smallest.
       assert told =~ "Shrunk: #{words}."
       recording = Path.rootname(file) <> ".mcap"
-      assert {:ok, asked} = Console.Replay.Options.parse([recording, "--at", "0.5"])
-      assert {0, _replayed} = with_io(fn -> Console.Replay.run(asked) end)
+      assert Runs.replayed_ms(recording) > 0
     end
   end
 

@@ -1,10 +1,11 @@
 defmodule Console.Cli.OutFile do
-  @moduledoc false
-  # Writes a file that a person has asked for, whole or not at all.
-  #
-  # `check/2` comes before a long run, so that an unwritable place is known at once. `write/3` writes
-  # a new file beside the old one and renames it, so that a full disk leaves the old file, and no
-  # empty one. Devices and pipes are written directly.
+  @moduledoc """
+  Writes a file that a person has asked for, whole or not at all.
+
+  `check/2` comes before a long run, so that an unwritable place is known at once. `write/3` writes
+  a new file beside the old one and renames it, so that a full disk leaves the old file, and no
+  empty one. Devices and pipes are written directly.
+  """
 
   @doc "Whether the file can be written now; the error names the option, the file and the reason."
   @spec check(option :: String.t(), Path.t() | nil) :: :ok | {:error, String.t()}

@@ -1,0 +1,198 @@
+defmodule Tools.Calibrate.Odometry do
+  @moduledoc false
+  # Runs `mix calibrate odometry`: lets a robot drive courses, asks for tape measurements, estimates the errors of its
+  # odometry, and writes the corrections into the robot's file.
+  alias Tools.Calibrate.{
+    Live,
+    Options,
+    Plan,
+    Question,
+    Report,
+    RobotFile,
+    Simulated,
+    StdinPrompt
+  }
+
+  alias Console.Cli.Output
+  alias Robot.Calibration
+  alias Robot.Calibration.{Drive, Keys}
+
+  @degree :math.pi() / 180
+
+  @doc "Runs the command. An error is one line, or several."
+  @spec run(Options.t()) :: :ok | {:error, String.t() | [String.t()]}
+  def run(%{mode: :simulate} = options), do: Simulated.run(options, Output.to(:stdio))
+  def run(%{mode: :typed} = options), do: typed(options)
+
+  def run(%{file: path} = options) do
+    with {:ok, file, conversions} <- RobotFile.load(path) do
+      {file, conversions} = begin(file, conversions)
+      Enum.each(Plan.lines(options, file), &IO.puts/1)
+
+      cond do
+        options.mode == :dry_run -> :ok
+        file.dry_run -> {:error, "#{path}: dry_run is true, so nothing would move"}
+        true -> live(options, file, conversions)
+      end
+    end
+  end
+
+  # Without conversions a base neither arms nor reports odometry; with those of another base it is
+  # off by some percent.
+  defp begin(%{drive: {driver, drive}} = file, conversions) when is_list(conversions) do
+    published = Keys.published(file.profile.name)
+    missing = for {key, _value} <- published, conversions[key] == nil, do: key
+
+    if missing != [],
+      do: IO.puts("#{Enum.join(missing, " and ")} not known yet: using the published ones")
+
+    conversions = Keyword.merge(published, Enum.reject(conversions, fn {_key, v} -> v == nil end))
+    drive = Keyword.put(drive, :conversions, conversions)
+    {%{file | drive: {driver, drive}, arm: :manual}, conversions}
+  end
+
+  defp begin(file, nil), do: {%{file | arm: :manual}, nil}
+
+  defp live(options, file, conversions) do
+    with {:ok, _apps} <- start_apps(),
+         # The robot is carried to its mark by hand, so it does not know where a fence is.
+         {:ok, config} <- Swarm.MemberSpec.config(%{file | camera: nil, ptz: nil, fence: nil}),
+         {:ok, _pid} <- start(config) do
+      talk = StdinPrompt.start()
+
+      try do
+        with :ok <- Live.ready(file.id) do
+          driven = Enum.flat_map(Simulated.tasks(options), &course(&1, file, options, talk))
+          finish(driven, options, file, conversions, talk)
+        end
+      catch
+        {:quit, line} -> {:error, line}
+      after
+        StdinPrompt.stop(talk)
+        Robot.Fleet.stop_robot(Robot.Fleet, file.id)
+      end
+    end
+  end
+
+  defp start_apps do
+    with {:error, {app, reason}} <- Application.ensure_all_started(:swarm),
+         do: {:error, "#{app} does not start: #{inspect(reason, limit: 5)}"}
+  end
+
+  defp start(config) do
+    with {:error, reason} <- Robot.Fleet.start_robot(Robot.Fleet, config),
+         do: {:error, "#{config.id} does not start: #{inspect(reason, limit: 5)}"}
+  end
+
+  # Repeats the course until it went well or is skipped.
+  defp course(task, file, options, talk) do
+    IO.puts("\nNow #{Plan.name(task)}. Put #{file.id} on its mark, and mark its direction.")
+
+    words = ["go", "skip", "quit", "reset", "acknowledge"]
+
+    case StdinPrompt.choose(talk, "go, skip or quit? ", words) do
+      {:ok, "go"} ->
+        begin_course(task, file, options, talk)
+
+      {:ok, "skip"} ->
+        []
+
+      {:ok, "reset"} ->
+        :ok = Robot.Safety.Gate.reset(file.id)
+        course(task, file, options, talk)
+
+      {:ok, "acknowledge"} ->
+        with {:error, line} <- Swarm.acknowledge(file.id), do: IO.puts("  " <> line)
+        course(task, file, options, talk)
+
+      _quit_or_end ->
+        throw({:quit, "ended by the user; nothing is written"})
+    end
+  end
+
+  defp begin_course(task, file, options, talk) do
+    drive = [legs: Drive.legs(task), speed: Plan.speed(options, file)]
+
+    case Live.drive(file.id, drive, talk, Output.to(:stdio)) do
+      {:ok, driven} ->
+        measure(task, driven, file, options, talk)
+
+      {:error, line} ->
+        IO.puts("  " <> line)
+
+        IO.puts(
+          "  (reset releases an emergency stop; acknowledge accepts that the line was lost)"
+        )
+
+        course(task, file, options, talk)
+    end
+  end
+
+  defp measure(task, driven, file, options, talk) do
+    {question, check} = Question.of(task)
+
+    case StdinPrompt.ask(talk, question, &answer(&1, check)) do
+      {:ok, :again} -> course(task, file, options, talk)
+      {:ok, value} -> [{task, Map.merge(driven, Question.measured(task, value))}]
+      :eof -> throw({:quit, "there was no answer; nothing is written"})
+    end
+  end
+
+  defp answer("again", _check), do: {:ok, :again}
+
+  defp answer(text, check) do
+    with {:error, allowed} <- check.(text), do: {:error, "#{allowed}, or again"}
+  end
+
+  defp typed(options) do
+    with {:ok, file, conversions} <- typed_file(options.file) do
+      angle = options.angle * @degree
+
+      measured = %{
+        distances: for(far <- options.measured, do: {options.distance, far}),
+        angles:
+          for degrees <- options.turned do
+            {if(degrees < 0, do: -angle, else: angle), degrees * @degree}
+          end,
+        runs: for(xy <- options.cw, do: {:cw, xy}) ++ for(xy <- options.ccw, do: {:ccw, xy}),
+        side: options.side
+      }
+
+      profile = if file, do: file.profile, else: apply(Hal.Profile, options.profile, [])
+      tell(measured, profile, conversions, options, nil)
+    end
+  end
+
+  defp typed_file(nil), do: {:ok, nil, nil}
+
+  defp typed_file(path) do
+    with {:ok, file, conversions} <- RobotFile.load(path) do
+      {file, conversions} = begin(file, conversions)
+      {:ok, file, conversions}
+    end
+  end
+
+  defp finish([], _options, _file, _conversions, _talk), do: {:error, "no course was driven"}
+
+  defp finish(driven, options, file, conversions, talk) do
+    measured = Simulated.measured(driven, options.side)
+    IO.puts("")
+    tell(measured, file.profile, conversions, options, talk)
+  end
+
+  defp tell(measured, profile, conversions, options, talk) do
+    with {:ok, wheels, squares} <- Calibration.estimate(measured, profile.wheel_base) do
+      Enum.each(Report.lines(wheels, squares, measured), &IO.puts/1)
+      found = Report.found(measured)
+
+      cond do
+        options.file == nil -> :ok
+        conversions == nil -> IO.puts("its drive has no conversions to correct")
+        true -> put(Keys.new(conversions, wheels, found), options, talk)
+      end
+    end
+  end
+
+  defp put(keys, %{write: true, file: path}, _talk), do: RobotFile.write(path, keys, :always)
+  defp put(keys, %{file: path}, talk), do: RobotFile.write(path, keys, talk || :never)
+end

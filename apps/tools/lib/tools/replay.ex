@@ -1,0 +1,154 @@
+defmodule Tools.Replay do
+  @moduledoc """
+  Replays a recording for people, of a run in lockstep or of robots of processes (`.Recording`): prints its stages, says whether
+  every decision is as recorded (`.Verdict`), how the fleet stood at a time (`.Moment`), compares two recordings, and goes
+  through one tick by tick (`.Session`).
+  """
+  alias Console.Cli.{Format, Output}
+  alias Tools.Replay.{Asked, Difference, Guard, Moment, Options, Recording, Session, Verdict}
+  alias Console.Tables
+  alias Record.Recording.Comparison
+  alias Lab.Replay.Kind
+
+  # So many differences are shown; the first ones explain the others.
+  @shown 3
+
+  @doc """
+  Runs the command, and returns its exit status: 0 if all is the same, 2 if something differs or
+  was lost, 1 if the recording cannot be read.
+  """
+  @spec run(Options.t()) :: 0 | 1 | 2
+  def run(%Options{} = options) do
+    with {:error, line} <- Guard.run(options.file, fn -> read(options) end), do: refuse(line)
+  rescue
+    error in Mcap.DamagedError -> refuse(Exception.message(error))
+  end
+
+  defp read(options) do
+    with {:ok, recording} <- Recording.open(options.file),
+         names = Recording.names(recording),
+         :ok <- Asked.check(options, names, Recording.last_ms(recording) / 1000),
+         do: follow(recording, options)
+  end
+
+  defp follow(recording, %{step: true} = options) do
+    IO.puts(Recording.heading(recording))
+    Session.run(options, recording)
+  end
+
+  defp follow(recording, %{against: nil} = options), do: replay(recording, options)
+  defp follow(recording, options), do: against(recording, options)
+
+  defp refuse(line) do
+    IO.puts(:stderr, "replay: #{line}")
+    1
+  end
+
+  defp against(one, options) do
+    with {:ok, other} <- Recording.open(options.against),
+         :ok <- Recording.alike(one, other) do
+      if one.begin == other.begin do
+        told(Comparison.first(Recording.comparable(one), Recording.comparable(other)))
+      else
+        IO.puts("The two begin differently: #{Difference.options(one.options, other.options)}")
+        2
+      end
+    end
+  end
+
+  defp told({:same, until_ms}) do
+    IO.puts("The two are the same, #{Format.seconds(until_ms)} of them.")
+    0
+  end
+
+  defp told({:ends, after_ms}) do
+    IO.puts("The two are the same until one ends, after #{Format.seconds(after_ms)}.")
+    2
+  end
+
+  defp told({:differs, difference}) do
+    Enum.each(Difference.parted(difference), &IO.puts/1)
+    2
+  end
+
+  defp replay(recording, options) do
+    with {:ok, tables} <- tables(options) do
+      output = Output.to(:stdio)
+      Output.line(output, Recording.heading(recording))
+      asked_s = options.at_s || options.until_s
+      until_ms = if asked_s, do: round(1_000 * asked_s), else: Recording.last_ms(recording)
+
+      run = %{
+        replay: Recording.replay(recording, only(options)),
+        before: nil,
+        tick: nil,
+        told: 0,
+        shown: [],
+        count: 0,
+        drawn_ms: Hal.Clock.now_ms(),
+        output: output,
+        until_ms: until_ms,
+        quiet?: options.at_s != nil,
+        tables: tables
+      }
+
+      run =
+        recording
+        |> Recording.ticks()
+        |> Stream.take_while(fn {at_ms, _entries} -> at_ms <= until_ms end)
+        |> Enum.reduce(run, &step/2)
+
+      {replay, last} = Kind.finish(run.replay)
+      run = differs(%{run | replay: replay}, last)
+      Output.finish(output)
+      Enum.each(Moment.lines(options, run, Recording.names(recording)), &IO.puts/1)
+      compared = Kind.compared(replay)
+      verdict = Verdict.lines(compared, Kind.at_ms(replay), run.shown, run.count)
+      Enum.each(verdict, &IO.puts/1)
+      with :ok <- close(run.tables), do: Verdict.status(compared, run.count)
+    end
+  end
+
+  # Another robot than the one that is shown may be asked why.
+  defp only(%{robot: name, why: why}) when why in [nil, name], do: name
+  defp only(_options), do: nil
+
+  defp tables(%{csv: nil}), do: {:ok, nil}
+  defp tables(%{csv: folder}), do: named(Tables.open(folder))
+
+  defp close(nil), do: :ok
+  defp close(tables), do: named(Tables.close(tables))
+
+  defp named({:error, line}), do: {:error, "--csv #{line}"}
+  defp named(ok), do: ok
+
+  defp step(tick, run) do
+    {replay, differences} = Kind.step(run.replay, tick)
+    run = differs(%{run | replay: replay, before: run.replay, tick: tick}, differences)
+    run |> tabulate() |> draw() |> tell()
+  end
+
+  defp differs(run, differences) do
+    shown = Enum.take(run.shown ++ differences, @shown)
+    %{run | shown: shown, count: run.count + length(differences)}
+  end
+
+  defp tabulate(%{tables: nil} = run), do: run
+
+  defp tabulate(%{replay: replay} = run),
+    do: %{run | tables: Tables.tick(run.tables, Kind.facts(replay, run.tick), Kind.scene(replay))}
+
+  defp draw(run) do
+    Output.redraw(run, fn ->
+      {Kind.at_ms(run.replay) / 1000, run.until_ms / 1000, "replayed"}
+    end)
+  end
+
+  defp tell(%{quiet?: true} = run), do: run
+
+  defp tell(run) do
+    stages = Kind.stages(run.replay)
+    Enum.each(Enum.drop(stages, run.told), &Output.line(run.output, Format.stage(&1)))
+    %{run | told: length(stages)}
+  end
+end
