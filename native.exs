@@ -1,7 +1,7 @@
 defmodule Mix.Tasks.Compile.Native do
   @shortdoc "Builds the C parts of an app into its priv folder"
   @moduledoc """
-  The Mix compiler of an app's C sources in `c_src/`. The project says what to build:
+  The Mix compiler of an app's C sources in `c_src/`. The project (`Convoy.Support.project/2`) says what to build:
 
       native: [
         nifs: [blobs: ["blobs.c", "blobs_nif.c"]],          # priv/blobs.so

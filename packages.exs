@@ -3,7 +3,7 @@ defmodule Convoy.Packages do
   Which packages of others an app is built with. Nothing needs one: each has an adapter, which is compiled where its
   package is. A `mix.exs` names them with the versions that its adapters are written for:
 
-      deps: Convoy.Packages.list(circuits_uart: "~> 1.5.5")
+      packages: [circuits_uart: "~> 1.5.5"]
 
   | `MIX_TARGET` | `CONVOY_DEPS` | packages |
   |---|---|---|

@@ -1,9 +1,10 @@
+Code.require_file("native.exs", __DIR__)
+Code.require_file("packages.exs", __DIR__)
+
 defmodule Mix.Tasks.Compile.Support do
   @shortdoc "Compiles what the tests of an app share"
   @moduledoc """
-  The Mix compiler of an app's `test/support`, into the folder of the app's own modules, in tests only:
-
-      compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env())
+  The Mix compiler of an app's `test/support`, into the folder of the app's own modules, in tests only.
 
   If it were one of `elixirc_paths`, Mix would take what it has built for a release and what it builds for tests for
   two different things, and `bin/test` would have to compile the robot's apps twice.
@@ -132,16 +133,44 @@ defmodule Mix.Tasks.Compile.Support do
 end
 
 defmodule Convoy.Support do
-  @moduledoc "What the project of an app with a folder `test/support` says of it."
+  @moduledoc "What the projects of all apps of the umbrella say alike."
 
-  @doc "The compilers of an app in this environment, from those that it has in all. What they make is listed in its `.app`."
-  @spec compilers([atom()], atom()) :: [atom()]
-  def compilers(all, :test),
+  @doc """
+  The project of an app, with what it says of its own:
+
+      def project, do: Convoy.Support.project(:lab, deps: [{:missions, in_umbrella: true}])
+
+  Two words are ours: `native`, what of its C is built (`Mix.Tasks.Compile.Native`), and `packages`, those of others that it
+  has adapters for (`Convoy.Packages.list/1`).
+  """
+  @spec project(atom(), keyword()) :: keyword()
+  def project(app, own) do
+    {packages, own} = Keyword.pop(own, :packages, [])
+    native = if own[:native], do: [:native], else: []
+    adapters = if packages != [], do: [:packages], else: []
+
+    common = [
+      app: app,
+      version: "0.1.0",
+      build_path: "../../_build",
+      config_path: "../../config/config.exs",
+      deps_path: "../../deps",
+      lockfile: "../../mix.lock",
+      elixir: "~> 1.14",
+      compilers: compilers(native ++ adapters ++ Mix.compilers(), Mix.env()),
+      # Files below `test` that are not tests, and that newer Mix shall not ask about.
+      test_ignore_filters: [&String.starts_with?(&1, "test/support/")],
+      start_permanent: Mix.env() == :prod
+    ]
+
+    common
+    |> Keyword.merge(own)
+    |> Keyword.put(:deps, Keyword.get(own, :deps, []) ++ Convoy.Packages.list(packages))
+  end
+
+  # What `support` makes is listed in the app's `.app`.
+  defp compilers(all, :test),
     do: Enum.flat_map(all, &if(&1 == :app, do: [:support, :app], else: [&1]))
 
-  def compilers(all, _env), do: all
-
-  @doc "The files below `test` that are not tests, and that newer Mix shall not ask about."
-  @spec files() :: [(Path.t() -> boolean())]
-  def files, do: [&String.starts_with?(&1, "test/support/")]
+  defp compilers(all, _env), do: all
 end

@@ -3,21 +3,7 @@ Code.require_file("../../support.exs", __DIR__)
 defmodule Console.MixProject do
   use Mix.Project
 
-  def project do
-    [
-      app: :console,
-      version: "0.1.0",
-      build_path: "../../_build",
-      config_path: "../../config/config.exs",
-      deps_path: "../../deps",
-      lockfile: "../../mix.lock",
-      elixir: "~> 1.14",
-      compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env()),
-      test_ignore_filters: Convoy.Support.files(),
-      start_permanent: Mix.env() == :prod,
-      deps: [{:lab, in_umbrella: true}]
-    ]
-  end
+  def project, do: Convoy.Support.project(:console, deps: [{:lab, in_umbrella: true}])
 
   def application,
     do: [extra_applications: [:logger, :crypto] ++ for_tests(Mix.env()) ++ [mochiweb: :optional]]

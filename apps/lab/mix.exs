@@ -4,24 +4,14 @@ defmodule Lab.MixProject do
   use Mix.Project
 
   def project do
-    [
-      app: :lab,
-      version: "0.1.0",
-      build_path: "../../_build",
-      config_path: "../../config/config.exs",
-      deps_path: "../../deps",
-      lockfile: "../../mix.lock",
-      elixir: "~> 1.14",
-      compilers: Convoy.Support.compilers(Mix.compilers(), Mix.env()),
-      test_ignore_filters: Convoy.Support.files(),
-      start_permanent: Mix.env() == :prod,
+    Convoy.Support.project(:lab,
       deps: [
         {:missions, in_umbrella: true},
         {:record, in_umbrella: true},
         {:sim, in_umbrella: true},
         {:vm, in_umbrella: true}
       ]
-    ]
+    )
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]

@@ -1,27 +1,16 @@
 Code.require_file("../../support.exs", __DIR__)
-Code.require_file("../../native.exs", __DIR__)
-Code.require_file("../../packages.exs", __DIR__)
 
 defmodule Vision.MixProject do
   use Mix.Project
 
   def project do
-    [
-      app: :vision,
-      version: "0.1.0",
-      build_path: "../../_build",
-      config_path: "../../config/config.exs",
-      deps_path: "../../deps",
-      lockfile: "../../mix.lock",
-      elixir: "~> 1.14",
-      compilers: Convoy.Support.compilers([:native, :packages | Mix.compilers()], Mix.env()),
-      test_ignore_filters: Convoy.Support.files(),
+    Convoy.Support.project(:vision,
       native: [nifs: [blobs: ["blobs.c", "blobs_nif.c"]]],
-      start_permanent: Mix.env() == :prod,
+      packages: [nx: "~> 0.6", evision: "~> 0.2.10"],
       deps: [
-        {:hal, in_umbrella: true} | Convoy.Packages.list(nx: "~> 0.6", evision: "~> 0.2.10")
+        {:hal, in_umbrella: true}
       ]
-    ]
+    )
   end
 
   def application, do: [extra_applications: [:logger, :crypto]]
