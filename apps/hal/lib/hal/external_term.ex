@@ -21,6 +21,19 @@ defmodule Hal.ExternalTerm do
   @atoms %{100 => 16, 115 => 8, 118 => 16, 119 => 8}
 
   @doc """
+  The atom of a text from outside, if there is one: makes none.
+
+      iex> {Hal.ExternalTerm.atom("ok"), Hal.ExternalTerm.atom("no atom was ever called so")}
+      {{:ok, :ok}, :error}
+  """
+  @spec atom(String.t()) :: {:ok, atom()} | :error
+  def atom(text) do
+    {:ok, String.to_existing_atom(text)}
+  rescue
+    ArgumentError -> :error
+  end
+
+  @doc """
   The term, if neither its bytes, unpacked, nor its memory are more than `most` bytes. Creates no atoms, and
   takes data only: of functions those with a name that exist here, no processes, references or ports; numbers of up
   to #{@most_digits} bytes; #{@most_depth} levels.

@@ -3,6 +3,7 @@ defmodule Hal.Options.ModuleLookup do
   Finds modules of this build by names that people write: the driver in a robot file, an option of
   a command.
   """
+  alias Hal.ExternalTerm
 
   @doc """
   The module of this name, loaded, if it is part of this build. Unknown names create no atoms.
@@ -23,17 +24,11 @@ defmodule Hal.Options.ModuleLookup do
 
   # A module that has not been used yet is known only by its file, which contains its name.
   defp known(name) do
-    with :error <- existing("Elixir." <> name) do
+    with :error <- ExternalTerm.atom("Elixir." <> name) do
       case :code.where_is_file(to_charlist("Elixir.#{name}.beam")) do
         :non_existing -> :error
         path -> Keyword.fetch(:beam_lib.info(path), :module)
       end
     end
-  end
-
-  defp existing(name) do
-    {:ok, String.to_existing_atom(name)}
-  rescue
-    ArgumentError -> :error
   end
 end

@@ -4,6 +4,8 @@ defmodule Record.Recording.Names do
   # not know them, and terms create no atoms when they are read. So a recording says its names as text, and these alone
   # become atoms: at most 1,000 of a file, of a name's form. Pure but for `know/2`.
 
+  alias Hal.ExternalTerm
+
   @most 1_000
   @form ~r/\A[A-Za-z_][A-Za-z0-9_@.?!-]{0,94}\z/
   @module "Elixir."
@@ -52,7 +54,7 @@ defmodule Record.Recording.Names do
           {:ok, left :: non_neg_integer()} | {:error, line :: String.t()}
   def know([text | rest], left) when is_binary(text) do
     cond do
-      known?(text) ->
+      ExternalTerm.atom(text) != :error ->
         know(rest, left)
 
       not Regex.match?(@form, text) ->
@@ -70,10 +72,4 @@ defmodule Record.Recording.Names do
 
   def know([], left), do: {:ok, left}
   def know(_other, _left), do: {:error, "begins with something that this program did not record"}
-
-  defp known?(text) do
-    is_atom(String.to_existing_atom(text))
-  rescue
-    ArgumentError -> false
-  end
 end

@@ -4,6 +4,7 @@ defmodule Robot.File.Terms do
   of their keys. Names become existing atoms and modules; a name without one becomes a
   `Robot.File.Terms.Name`, and no atom is created for it.
   """
+  alias Hal.ExternalTerm
   alias Hal.Options.ModuleLookup
   alias Hal.Options.Type
   alias Robot.File.Reader
@@ -62,8 +63,7 @@ defmodule Robot.File.Terms do
   def term({_line, {:tuple, nodes}}), do: nodes |> Enum.map(&term/1) |> List.to_tuple()
   def term({_line, {:map, pairs}}), do: Map.new(pairs, fn {k, v} -> {term(k), term(v)} end)
 
-  def term({_line, {:name, name}}),
-    do: with(:error <- existing(name), do: %Name{text: ":" <> name})
+  def term({_line, {:name, name}}), do: known(name, %Name{text: ":" <> name})
 
   # The options of a driver follow its name. Calling its table loads the names of these options as
   # atoms before they are looked up.
@@ -77,7 +77,8 @@ defmodule Robot.File.Terms do
   end
 
   def term({_line, {:keys, keys}}) do
-    for {name, _line, node} <- Enum.uniq_by(keys, &elem(&1, 0)), do: {key(name), term(node)}
+    for {name, _line, node} <- Enum.uniq_by(keys, &elem(&1, 0)),
+        do: {known(name, name), term(node)}
   end
 
   def term({_line, value}), do: value
@@ -90,12 +91,11 @@ defmodule Robot.File.Terms do
   def strange(map) when is_map(map) and not is_struct(map), do: map |> Map.to_list() |> strange()
   def strange(_value), do: nil
 
-  defp key(name), do: with(:error <- existing(name), do: name)
-
-  defp existing(name) do
-    String.to_existing_atom(name)
-  rescue
-    ArgumentError -> :error
+  defp known(name, otherwise) do
+    case ExternalTerm.atom(name) do
+      {:ok, atom} -> atom
+      :error -> otherwise
+    end
   end
 
   defp twice({_line, {:keys, keys}}, path) do

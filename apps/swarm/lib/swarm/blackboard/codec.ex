@@ -15,6 +15,7 @@ defmodule Swarm.Blackboard.Codec do
   hint, the name is the byte of its bucket, `incarnation` its count and `sequence`
   `{writer, check}`; a deleted hint has an empty payload.
   """
+  alias Hal.ExternalTerm
   alias Swarm.Blackboard.{AntiEntropy, Rows}
   alias Swarm.Wire
 
@@ -246,10 +247,8 @@ defmodule Swarm.Blackboard.Codec do
   """
   @spec robot(term()) :: {:ok, atom()} | :error
   def robot(name) when is_binary(name) and byte_size(name) in 1..255 do
-    robot = String.to_existing_atom(name)
-    if Wire.name?(robot), do: {:ok, robot}, else: :error
-  rescue
-    ArgumentError -> :error
+    with {:ok, robot} <- ExternalTerm.atom(name),
+         do: if(Wire.name?(robot), do: {:ok, robot}, else: :error)
   end
 
   def robot(_other), do: :error

@@ -4,6 +4,7 @@ defmodule Swarm.Membership.NameSet do
   exchange fifty thousand heartbeats a second; a list of a hundred names would be copied at every send, every write to a
   board and every read of one, while a binary is shared. Pure.
   """
+  alias Hal.ExternalTerm
 
   @typedoc "The names, sorted, each with a zero before and behind it."
   @type t :: binary()
@@ -31,14 +32,9 @@ defmodule Swarm.Membership.NameSet do
   @doc "The names in the set; names that are not atoms on this node are left out."
   @spec names(t()) :: [atom()]
   def names(roll) do
-    for name <- :binary.split(roll, <<0>>, [:global, :trim_all]), id = known(name), do: id
-  end
-
-  # Names from outside never become atoms.
-  defp known(name) do
-    String.to_existing_atom(name)
-  rescue
-    ArgumentError -> nil
+    for name <- :binary.split(roll, <<0>>, [:global, :trim_all]),
+        {:ok, id} <- [ExternalTerm.atom(name)],
+        do: id
   end
 
   @doc """

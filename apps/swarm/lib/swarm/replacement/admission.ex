@@ -2,6 +2,7 @@ defmodule Swarm.Replacement.Admission do
   @moduledoc false
   # Decides whether an order is carried out: by its signer and time; whether its robots allow it now; whether this build has
   # its mission. All robots of the node that it is for take it, or none. An error is one line.
+  alias Hal.ExternalTerm
   alias Robot.Mission
   alias Swarm.Replacement.{Entries, Job, Order}
 
@@ -57,17 +58,11 @@ defmodule Swarm.Replacement.Admission do
   end
 
   defp mission(%Order{mission: name}) do
-    with {:ok, module} <- existing(name), true <- Mission.mission?(module) do
+    with {:ok, module} <- ExternalTerm.atom(name), true <- Mission.mission?(module) do
       {:ok, module}
     else
       _unknown -> {:error, "#{Order.name(name)} is not a mission of this build"}
     end
-  end
-
-  defp existing(name) do
-    {:ok, String.to_existing_atom(name)}
-  rescue
-    ArgumentError -> :error
   end
 
   @doc "Whether it must not be disturbed. What has not been started yet gives way."
