@@ -9,12 +9,9 @@ defmodule Console.About do
   alias Swarm.{Member, Status}
   alias Swarm.Status.{Sight, Words}
 
-  # Readings that are older tell nothing of now.
-  @recent_ms 1_000
-
   @typedoc """
   `wishes` are all behaviours that wished, with their weights, the chosen one first; `way` are the corners of the way that
-  it takes, and `pose` where it believes to be: `[x, y]` in metres.
+  it takes, and `pose` where it believes to be: `[x, y]` in metres; `notes` are what its status remarks, as in `iex`.
   """
   @type t :: %{atom() => term()}
 
@@ -23,28 +20,25 @@ defmodule Console.About do
   def of(robot) do
     with {:ok, board} <- Board.find(robot) do
       entries = Board.entries(board)
-      doing = recent(entries, :doing) || %{by: nil, weights: [], way: [], limits: [], fault: nil}
+      mission = with {%{mission: mission}, _age_ms} <- entries[:release], do: mission
 
-      %{
-        by: doing.by,
-        wishes: wishes(doing.weights),
-        way: points(doing.way),
-        pose: entries |> recent(:pose) |> point(),
-        fault: doing.fault,
-        limits: doing.limits ++ (recent(entries, :driving) || %{limits: []}).limits,
-        power: recent(entries, :power, 60_000),
-        offline: for({{:health, device}, {{:offline, _reason}, _age}} <- entries, do: device),
-        estop: Board.latched?(board),
-        sonar: sonar(robot, recent(entries, :sonar)),
-        seen: seen(recent(entries, :detections)),
-        camera: Names.whereis(robot, :view) != nil,
-        pictures: nil,
-        notes: claimed(recent(entries, :mission, :infinity))
+      # No driver is asked for its words here.
+      config = %{
+        id: robot,
+        profile: Setup.profile(robot),
+        start: Pose.new(0, 0),
+        mission: mission,
+        drive: {nil, []},
+        ptz: {nil, []},
+        camera: {nil, []}
       }
-      |> Map.merge(
-        sight(robot, entries, (recent(entries, :release, :infinity) || %{mission: nil}).mission)
-      )
-      |> Map.merge(wheels(recent(entries, :odometry)))
+
+      config
+      |> by_board(entries, board)
+      |> Map.merge(%{
+        seen: seen(fresh(entries)[:detections]),
+        camera: Names.whereis(robot, :view) != nil
+      })
     else
       :error -> nil
     end
@@ -52,47 +46,60 @@ defmodule Console.About do
 
   @doc "The same of a robot in lockstep, by what it perceived last; it has no devices and no camera pictures to look at."
   @spec of_member(Member.t()) :: t() | nil
-  def of_member(%Member{} = member) do
-    controller = Member.role(member, :executive).controller
-
-    with %Percept{} = percept <- Controller.percept(controller) do
-      {id, mission} = {Member.id(member), member.lockstep.config.mission}
-      weights = Controller.weights(controller)
-
-      %{
-        by: List.first(for {by, _weight} <- weights, do: by),
-        wishes: wishes(weights),
-        way: points(Controller.way(controller)),
-        pose: point(percept.pose),
-        fault: Controller.fault(controller),
-        limits: Controller.limits(controller) ++ (percept.driving || %{limits: []}).limits,
-        power: percept.power,
-        offline: [],
-        estop: Member.held(member) != nil,
-        sonar: sonar(id, percept.sonar),
-        seen: nil,
-        camera: false,
-        pictures: nil,
-        notes: claimed(%{claim: Member.claim(member)})
-      }
-      |> Map.merge(sight(id, now(percept), mission))
-      |> Map.merge(wheels(percept.odometry))
+  def of_member(%Member{lockstep: %{config: config, board: board}} = member) do
+    with %Percept{at_ms: now_ms} <- Controller.percept(Member.role(member, :executive).controller) do
+      entries = for {key, {value, at_ms}} <- board, into: %{}, do: {key, {value, now_ms - at_ms}}
+      by_board(config, entries, board)
     end
+  end
+
+  defp by_board(config, entries, board) do
+    fresh = fresh(entries)
+    status = config |> Map.put(:colours, Sim.World.colours()) |> Status.of_board(fresh, board)
+    turn = with {%Odometry{twist: twist}, _age_ms} <- fresh[:odometry], do: twist.turn
+    status |> told() |> Map.merge(%{turn: turn, sonar: sonar(config.profile, fresh[:sonar])})
+  end
+
+  # Readings that are older tell nothing of now.
+  @recent_ms 1_000
+  @readings [:odometry, :sonar, :ptz, :detections, :doing, :driving, :pose, :uncertainty]
+  @power_ms 60_000
+
+  defp fresh(entries) do
+    :maps.filter(
+      fn
+        key, {_value, age_ms} when key in @readings -> age_ms <= @recent_ms
+        :power, {_value, age_ms} -> age_ms <= @power_ms
+        _key, _entry -> true
+      end,
+      entries
+    )
   end
 
   @doc """
   The same of a robot anywhere, from its status, and its sonars, which it is asked for; the pictures of its camera do not leave
-  its node, and `pictures` says so. `notes` are what its status remarks, as in `iex`.
+  its node, and `pictures` says so.
   """
   @spec of_status(Status.t()) :: t()
   def of_status(%Status{} = status) do
     here? = Names.whereis(status.robot, :view) != nil
+    there? = not here? and is_map_key(status.health, :camera)
 
+    status
+    |> told()
+    |> Map.merge(%{
+      sonar: asked(status),
+      camera: here?,
+      pictures: if(there?, do: "do not leave #{status.node}: look from there")
+    })
+  end
+
+  defp told(status) do
     %{
       by: status.by,
-      wishes: wishes(status.weights),
-      way: points(status.way),
-      pose: point(status.pose),
+      wishes: for({by, weight} <- status.weights, do: [by, weight]),
+      way: for({x, y} <- status.way, do: [x, y]),
+      pose: with(%Pose{x: x, y: y} <- status.pose, do: [x, y]),
       fault: status.fault,
       speed: status.speed,
       turn: nil,
@@ -100,13 +107,10 @@ defmodule Console.About do
       power: status.power,
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
-      sonar: asked(status),
+      sonar: [],
       seen: nil,
-      camera: here?,
-      pictures:
-        if(not here? and is_map_key(status.health, :camera),
-          do: "do not leave #{status.node}: look from there"
-        ),
+      camera: false,
+      pictures: nil,
       looks: Sight.words(status.head),
       sees: Sight.words(status.sees),
       notes: notes(status)
@@ -121,37 +125,6 @@ defmodule Console.About do
   end
 
   defp asked(_row), do: []
-
-  # What it perceived last, as entries of a board.
-  defp now(percept), do: %{ptz: {percept.ptz, 0}, detections: {percept.detections, 0}}
-
-  defp sight(robot, entries, mission) do
-    config = %{
-      id: robot,
-      profile: Setup.profile(robot),
-      colours: Sim.World.colours(),
-      mission: mission
-    }
-
-    head = entries |> Sight.head() |> Sight.words()
-    %{looks: head, sees: config |> Sight.of(entries) |> Sight.words()}
-  end
-
-  defp wishes(weights), do: for({by, weight} <- weights, do: [by, weight])
-  defp points(places), do: for({x, y} <- places, do: [x, y])
-  defp point(nil), do: nil
-  defp point(%Pose{x: x, y: y}), do: [x, y]
-
-  # What its mission says to people.
-  defp claimed(%{claim: claim}) do
-    blocked_by = claim[:blocked_by]
-
-    for text <- [blocked_by && "blocked by #{blocked_by}", claim[:says]],
-        is_binary(text),
-        do: text
-  end
-
-  defp claimed(_none), do: []
 
   defp notes(status) do
     Enum.filter(
@@ -174,26 +147,15 @@ defmodule Console.About do
   @spec picture(atom()) :: {:ok, binary()} | {:error, line :: String.t()}
   def picture(robot), do: Swarm.Camera.snapshot(robot)
 
-  # What they report, not what they are told.
-  defp wheels(%Odometry{twist: twist}), do: %{speed: twist.linear, turn: twist.turn}
-  defp wheels(nil), do: %{speed: nil, turn: nil}
-
-  defp recent(entries, key, ms \\ @recent_ms) do
-    case entries do
-      %{^key => {value, age_ms}} when age_ms <= ms -> value
-      _none_or_old -> nil
-    end
-  end
-
   # Where each sonar is on the body, where it looks, and how far the nearest thing is: metres and radians.
-  defp sonar(_robot, nil), do: []
+  defp sonar(_profile, nil), do: []
 
-  defp sonar(robot, ranges) do
-    for {%Pose{} = at, range} <- Enum.zip(Setup.profile(robot).sonars, ranges),
+  defp sonar(profile, {ranges, _age_ms}) do
+    for {%Pose{} = at, range} <- Enum.zip(profile.sonars, ranges),
         do: [at.x, at.y, at.heading, range]
   end
 
-  defp seen(%{blobs: [first | _] = blobs}) do
+  defp seen({%{blobs: [first | _] = blobs}, _age_ms}) do
     boxes = for blob <- blobs, do: [blob.colour, blob.left, blob.top, blob.right, blob.bottom]
     %{width: first.width, height: first.height, boxes: boxes}
   end

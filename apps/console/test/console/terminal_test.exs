@@ -107,6 +107,31 @@ defmodule Console.TerminalTest do
     end
   end
 
+  test "one that is not sure of its place says why, in a row that keeps the width" do
+    scene = "" |> Runs.scene(12) |> doubt(:mag3, 0.62)
+    why = "lost: a third of what it hears fits the plan"
+
+    told = fn scene, why ->
+      update_in(scene.robots, &for(r <- &1, do: Map.put(r, :says, r.id == :mag3 && why)))
+    end
+
+    rows = scene |> told.(why) |> screen(80, 24)
+    at = Enum.find_index(rows, &(&1 =~ "not sure"))
+    assert Enum.at(rows, at + 1) =~ ~r/  lost: a third of what it hears fi…$/
+    assert String.length(Enum.at(rows, at + 1)) <= 80
+
+    # What a robot says that is sure is not for the table.
+    sure = update_in(scene.robots, &for(r <- &1, do: %{r | state: :follow}))
+    refute sure |> told.(why) |> screen(80, 24) |> Enum.any?(&(&1 =~ "lost: a third"))
+
+    # Where rows are few, no reason stands without its robot.
+    for rows <- 8..24, screen = scene |> told.(why) |> screen(80, rows) do
+      assert length(screen) == rows
+      reasons = Enum.count(screen, &(&1 =~ "lost: a third"))
+      assert reasons <= Enum.count(screen, &(&1 =~ "not sure"))
+    end
+  end
+
   test "however unsure robots are, the table keeps its width" do
     scene = Runs.scene("", 12)
 

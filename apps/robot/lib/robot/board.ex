@@ -268,8 +268,9 @@ defmodule Robot.Board do
   def saved?(%__MODULE__{latch: latch}), do: Latch.saved?(latch)
 
   @doc "The file of the latch that could not be written or removed, and why; `nil` if the last attempt succeeded."
-  @spec unsaved(t()) :: Files.fault() | nil
+  @spec unsaved(t() | entries()) :: Files.fault() | nil
   def unsaved(%__MODULE__{latch: latch}), do: Latch.unsaved(latch)
+  def unsaved(_without_a_file), do: nil
 
   @doc "Notes, for after a restart, that the robot has left its start pose; a failure is tried again each second."
   @spec depart(t(), Departure.frame()) :: :ok

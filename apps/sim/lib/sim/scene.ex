@@ -28,15 +28,17 @@ defmodule Sim.Scene do
   believes to be in 95 of 100 cases, `nil` if it does not know.
   """
   @type robot :: %{
-          id: atom(),
-          pose: Pose.t(),
-          radius: float(),
-          alive: boolean(),
-          state: atom(),
-          slot: Pose.point() | nil,
-          leader?: boolean(),
-          uncertainty: float() | nil,
-          size_ppm: non_neg_integer() | nil
+          required(:id) => atom(),
+          required(:pose) => Pose.t(),
+          required(:radius) => float(),
+          required(:alive) => boolean(),
+          required(:state) => atom(),
+          required(:slot) => Pose.point() | nil,
+          required(:leader?) => boolean(),
+          required(:uncertainty) => float() | nil,
+          required(:size_ppm) => non_neg_integer() | nil,
+          optional(:says) => String.t() | nil,
+          optional(atom()) => term()
         }
 
   @typedoc """

@@ -103,6 +103,9 @@ defmodule Swarm.Status do
     offline: {%{}, nil}
   ]
 
+  # What its comms knows, and not its board.
+  @heard [:peers, :view, :hears, :rejected]
+
   @enforce_keys [:robot]
   defstruct @enforce_keys ++ for({name, {default, _sent}} <- @fields, do: {name, default})
 
@@ -153,15 +156,25 @@ defmodule Swarm.Status do
   @doc "The status of a robot of this node, from its board and its receiver."
   @spec of(Robot.Config.t(), Board.t(), Receiver.t()) :: t()
   def of(config, board, receiver) do
-    seen = %{
-      config: config,
-      board: board,
-      receiver: receiver,
-      now_ms: Robot.Config.now(config),
-      entries: Board.entries(board)
-    }
+    heard = %{receiver: receiver, now_ms: Robot.Config.now(config)}
 
-    fields = for {name, _about} <- @fields, do: {name, read(name, seen)}
+    config
+    |> of_board(Board.entries(board), board)
+    |> struct!(for name <- @heard, do: {name, read(name, heard)})
+  end
+
+  @doc """
+  The same by its board alone, from its entries with their ages, and the board itself, which may be one of a robot in lockstep:
+  without what its comms alone knows, such as `hears`. The config may be what of it is needed.
+  """
+  @spec of_board(
+          Robot.Config.t() | %{id: atom(), start: Pose.t(), drive: {nil, []}},
+          %{term() => {term(), age_ms :: integer()}},
+          Board.t() | Board.entries()
+        ) :: t()
+  def of_board(config, entries, board) do
+    seen = %{config: config, board: board, entries: entries}
+    fields = for {name, _about} <- @fields, name not in @heard, do: {name, read(name, seen)}
     struct!(__MODULE__, [{:robot, config.id} | fields])
   end
 

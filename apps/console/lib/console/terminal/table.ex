@@ -14,16 +14,36 @@ defmodule Console.Terminal.Table do
   def draw(scene, rows) do
     robots = Enum.sort_by(scene.robots, &rank/1)
     room = max(rows - 1, 0)
+    all = Enum.flat_map(robots, &rows/1)
 
     shown =
-      if length(robots) <= room do
-        Enum.map(robots, &row/1)
+      if length(all) <= room do
+        all
       else
-        {shown, hidden} = Enum.split(robots, max(room - 1, 0))
-        Enum.map(shown, &row/1) ++ [rest(hidden)]
+        {shown, hidden} = Enum.split(robots, fitting(robots, max(room - 1, 0)))
+        Enum.flat_map(shown, &rows/1) ++ [rest(hidden)]
       end
 
     Enum.take([heading() | shown] ++ List.duplicate([], rows), rows)
+  end
+
+  # How many of the first robots have room for all their rows.
+  defp fitting(robots, room) do
+    robots
+    |> Enum.scan(0, &(length(rows(&1)) + &2))
+    |> Enum.count(&(&1 <= room))
+  end
+
+  # One that is not sure of its place says why below.
+  defp rows(%{state: :unsure, alive: true, says: "" <> why} = robot),
+    do: [row(robot), [{short("  " <> why), :unsure}]]
+
+  defp rows(robot), do: [row(robot)]
+
+  defp short(text) do
+    if String.length(text) > @width,
+      do: String.slice(text, 0, @width - 1) <> "…",
+      else: text
   end
 
   # The leader, then the robots that need attention, then the rest in the given order.

@@ -153,7 +153,8 @@ defmodule Lab.Replay.Robots do
   end
 
   defp seen(replay, id, robot) do
-    account = Evaluation.account_of(robot.mission, claim(replay, id))
+    claim = claim(replay, id)
+    account = Evaluation.account_of(robot.mission, claim)
 
     %{
       id: id,
@@ -164,6 +165,7 @@ defmodule Lab.Replay.Robots do
       slot: nil,
       leader?: id == RunLog.leader(replay.run_log),
       uncertainty: robot.uncertainty,
+      says: claim[:says],
       size_ppm: account.sight && account.sight.size_ppm
     }
   end

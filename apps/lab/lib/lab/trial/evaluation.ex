@@ -37,6 +37,7 @@ defmodule Lab.Trial.Evaluation do
           slot: slot && Pose.point(slot),
           leader?: id == leader,
           uncertainty: claim[:uncertainty],
+          says: claim[:says],
           size_ppm: account.sight && account.sight.size_ppm
         }
       end

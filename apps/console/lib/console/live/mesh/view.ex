@@ -167,6 +167,7 @@ defmodule Console.Live.Mesh.View do
       leader?: "#{status.state}" == "lead",
       follows: if(status.leader != status.robot, do: status.leader),
       uncertainty: status.uncertainty,
+      says: status.says,
       size_ppm: nil,
       frame: frame,
       apart: apart
