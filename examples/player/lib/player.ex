@@ -29,6 +29,8 @@ defmodule Player do
     Unsupported
   }
 
+  alias Player.Writer
+
   @drivers %{
     "rflex" => :drive,
     "sonyevid30" => :ptz,
@@ -202,7 +204,7 @@ defmodule Player do
     id = options[:id] || if(profile == :magellan, do: :mag1, else: :min1)
 
     %{
-      text: Player.Render.write(state, file, id, profile, @modules),
+      text: write(state, file, id, profile, @modules),
       id: id,
       profile: profile,
       assumed: Enum.sort(state.assumed),
@@ -247,5 +249,53 @@ defmodule Player do
       {:error, why} ->
         left(state, line, option, "the colour file must be corrected: #{why}")
     end
+  end
+
+  # Writes the text of a robot file from an imported Player configuration. Pure.
+
+  @order [:id, :profile, :body, :drive, :ptz, :camera, :colours, :limits, :start, :policies]
+
+  # The text of the robot file: comments on its source and on what was assumed, then all keys;
+  # `modules` are the drivers.
+  defp write(state, file, id, profile, modules) do
+    nested =
+      Enum.reduce(state.values, [], fn {path, value, _, _}, all -> nest(all, path, value) end)
+
+    known = %{id: id, profile: profile, start: {0.0, 0.0, {:deg, 0.0}}}
+
+    keys =
+      for key <- @order, value = known[key] || key(key, nested[key], modules), do: {key, value}
+
+    Writer.text(head(file, state), keys)
+  end
+
+  defp key(kind, options, modules) when is_map_key(modules, kind),
+    do: options && {modules[kind], options}
+
+  defp key(_key, value, _modules), do: value
+
+  defp head(file, state) do
+    assumed =
+      for {line, what, why} <- Enum.sort(state.assumed), do: "  line #{line}, #{what}: #{why}"
+
+    lines =
+      [
+        "From #{Path.basename(file)}, a configuration of the Player device server.",
+        "mix robot.check shows what it says; template.exs explains all keys."
+      ] ++ if(assumed == [], do: [], else: ["", "Assumed:" | assumed])
+
+    # A comment must not contain what would end it.
+    Enum.map(lines, &String.replace(&1, ~r/[^\x20-\x7E]/, "?"))
+  end
+
+  # In the order of the lines of Player's file.
+  defp nest(all, [key], value), do: all ++ [{key, value}]
+
+  defp nest(all, [key | path], value) do
+    inner = nest(Keyword.get(all, key, []), path, value)
+
+    if Keyword.has_key?(all, key),
+      do: Keyword.replace!(all, key, inner),
+      else: all ++ [{key, inner}]
   end
 end

@@ -6,13 +6,13 @@ defmodule Swarm.Application do
   alias Mesh.Distribution.ConnectionLog
   alias Swarm.MemberSpec
   alias Swarm.Message.Checked
-  alias Swarm.Host.{DepartureFile, ReleaseBoot, Resolver, Systemd}
+  alias Swarm.Host.{DepartureFile, ReleaseBoot, Systemd}
 
   # With `config :swarm, boot: true`, as in a release, the node is the robot that its environment
   # names.
   @impl Application
   def start(_type, _arguments) do
-    :ok = Resolver.open()
+    :ok = ask_name_servers()
     :ok = Checked.begin()
     environment = System.get_env()
     :ok = Robot.Devices.Log.attach()
@@ -28,7 +28,7 @@ defmodule Swarm.Application do
   end
 
   @impl Application
-  def stop(_state), do: Resolver.close()
+  def stop(_state), do: ask_none()
 
   defp robot(false, _environment), do: {:ok, :none}
 
@@ -91,4 +91,31 @@ defmodule Swarm.Application do
 
   defp wheels(:manual), do: "stand until a person arms them"
   defp wheels(:auto), do: "arm by themselves"
+
+  # Lets a node ask name servers once it is up. Erlang asks for the name of its machine when it starts, and would wait for
+  # a name server that does not answer; so the scripts start it with `RES_OPTIONS=attempts:0`, by which the C library asks
+  # none, and keep in `CONVOY_RES_OPTIONS` what was there before. Programs that the node starts, such as one that reads a
+  # camera by its name, inherit its environment.
+
+  @kept "CONVOY_RES_OPTIONS"
+  @options "RES_OPTIONS"
+
+  # Name servers are asked from now on, by this node and by what it starts.
+  defp ask_name_servers do
+    case System.get_env(@kept) do
+      nil -> :ok
+      "" -> again(System.delete_env(@options))
+      options -> again(System.put_env(@options, options))
+    end
+  end
+
+  # The program that asks for Erlang still has the old environment.
+  defp again(:ok) do
+    _answer = :inet_gethost_native.control(:soft_restart)
+    :ok
+  end
+
+  # As before the start, for a restart within the same process of the operating system.
+  defp ask_none,
+    do: if(System.get_env(@kept), do: System.put_env(@options, "attempts:0"), else: :ok)
 end

@@ -5,7 +5,6 @@ defmodule Vision.Picture do
   """
   alias Hal.Frame
   alias Vision.{Blob, Colours, Pixels, Rgb}
-  alias Vision.Picture.Letters
 
   @black {0, 0, 0}
   @white {255, 255, 255}
@@ -102,7 +101,7 @@ defmodule Vision.Picture do
     box(blob.left - 1, blob.top - 1, blob.right + 1, blob.bottom + 1, @black) ++
       box(blob.left, blob.top, blob.right, blob.bottom, rgb) ++
       cross(round(blob.x), round(blob.y)) ++
-      Letters.strokes(text, {blob.left, top}, scale, @white, @black)
+      letters(text, {blob.left, top}, scale, @white, @black)
   end
 
   defp box(left, top, right, bottom, rgb) do
@@ -111,4 +110,39 @@ defmodule Vision.Picture do
   end
 
   defp cross(x, y), do: for(d <- -3..3, place <- [{x + d, y}, {x, y + d}], do: {place, @white})
+
+  # Letters of 3 by 5 dots. Each digit is a row; its bits are the dots from left to right.
+
+  @dots Map.new(
+          ~w(A25755 B65656 C34443 D65556 E74647 F74644 G34553 H55755 I72227 J11152 K55655 L44447
+             M57755 N65555 O25552 P65644 Q25563 R65655 S34216 T72222 U55557 V55522 W55775 X55255
+             Y55222 Z71247 075557 126227 271747 371717 455711 574717 674757 771111 875757 975717
+             .00002 -00700 _00007 :02020 =07070 %51245),
+          fn <<letter, rows::binary>> -> {letter, for(<<row <- rows>>, do: row - ?0)} end
+        )
+  # For characters that are not in it.
+  @unknown [7, 5, 5, 5, 7]
+
+  # The dots of a text on a dark ground, as `{place, colour}`; the ground comes first.
+  defp letters(text, {left, top}, scale, ink, ground) do
+    of_text = text |> String.upcase() |> String.to_charlist()
+    across = scale * (4 * length(of_text) + 1)
+
+    under = for x <- 0..(across - 1), y <- 0..(7 * scale - 1), do: {{left + x, top + y}, ground}
+
+    dots =
+      for {letter, column} <- Enum.with_index(of_text),
+          {row, y} <- Enum.with_index(rows(letter)),
+          {bit, x} <- [{4, 0}, {2, 1}, {1, 2}],
+          Bitwise.band(row, bit) != 0,
+          dx <- 1..scale,
+          dy <- 1..scale do
+        {{left + scale * (4 * column + x + 1) + dx - 1, top + scale * (y + 1) + dy - 1}, ink}
+      end
+
+    under ++ dots
+  end
+
+  defp rows(?\s), do: [0, 0, 0, 0, 0]
+  defp rows(letter), do: Map.get(@dots, letter, @unknown)
 end

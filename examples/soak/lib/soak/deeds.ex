@@ -5,9 +5,9 @@ defmodule Soak.Deeds do
   """
   alias Lab.Node.Log
   alias Soak.{Fleet, Junk, Orders, State}
-  alias Soak.Deeds.Shout
   alias Soak.Fleet.Tree
   alias Vm.Net
+  alias Lab.Node.Network
 
   @order_ms 8_000
 
@@ -49,7 +49,7 @@ defmodule Soak.Deeds do
   def carry_out(s, {:block, _a, _b, ms} = deed), do: network(s, :block, ms, deed)
 
   def carry_out(s, {:junk, robot, kind, size, seed}) do
-    Shout.at(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
+    at(s, robot, Junk.datagrams(kind, size, seed, Enum.reverse(s.recorded)))
 
     s
     |> State.count(:junk)
@@ -62,7 +62,7 @@ defmodule Soak.Deeds do
     mixed =
       Enum.flat_map([:random, :mutated], &Junk.datagrams(&1, 100, seed, Enum.reverse(s.recorded)))
 
-    Shout.at(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
+    at(s, robot, mixed |> Stream.cycle() |> Stream.take(size))
     s |> State.count(:flood) |> State.write("flood of #{size} datagrams to #{robot}")
   end
 
@@ -180,4 +180,29 @@ defmodule Soak.Deeds do
   defp skip(s, deed), do: State.write(s, "left out, its node is not there: #{inspect(deed)}")
 
   defp now, do: Log.now()
+
+  # Sends a stranger's datagrams to a node of a run, beside everything else.
+
+  # Between so many datagrams of a flood others get their turn.
+  @burst 200
+
+  # Begins to send them to a robot's node; where there is no stranger, nothing.
+  defp at(%{stranger: nil}, _robot, _datagrams), do: :ok
+
+  defp at(s, robot, datagrams) do
+    {address, port} = Network.address(s.fleet.network, robot)
+
+    spawn(fn ->
+      for burst <- Stream.chunk_every(datagrams, @burst) do
+        for datagram <- burst, do: _ = :gen_udp.send(s.stranger, address, port, datagram)
+
+        receive do
+        after
+          10 -> :ok
+        end
+      end
+    end)
+
+    :ok
+  end
 end

@@ -9,7 +9,6 @@ defmodule Soak.Schedule do
   cycle of a run that is no multiple of 75 s is shorter in both its parts.
   """
 
-  alias Soak.Schedule.Draw
   alias Lab.Chaos.Random
 
   @cycle_ms 75_000
@@ -91,7 +90,7 @@ defmodule Soak.Schedule do
 
     Enum.map_reduce(List.duplicate(kind, n), random, fn kind, random ->
       {at, random} = Random.whole(random, 500, busy)
-      {deed, random} = Draw.one(kind, robots, random)
+      {deed, random} = one(kind, robots, random)
       {{from + at, deed}, random}
     end)
   end
@@ -136,5 +135,57 @@ defmodule Soak.Schedule do
     if chance < 0.5,
       do: {[{from + at, {:estop, robot}}, {reset, :reset}, {reset + 500, :start}], random},
       else: {[], random}
+  end
+
+  # Draws deeds of `bin/soak`, and what they are made of, from a state of `:rand`. Pure.
+
+  import Lab.Chaos.Random, only: [pick: 2, whole: 3]
+
+  @type random :: Lab.Chaos.Random.t()
+
+  # A deed of a kind that lasts for itself, as in `Soak.Schedule`.
+  defp one(:world, _robots, random), do: {:world, random}
+
+  defp one(:process, robots, random) do
+    {robot, random} = pick(random, robots)
+    {chance, random} = :rand.uniform_s(random)
+    {{:process, robot, chance}, random}
+  end
+
+  defp one(:node, robots, random) do
+    {robot, random} = pick(random, robots)
+    {{:node, robot}, random}
+  end
+
+  defp one(:freeze, robots, random) do
+    {robot, random} = pick(random, robots)
+    {ms, random} = whole(random, 200, 5_000)
+    {{:freeze, robot, ms}, random}
+  end
+
+  defp one(:junk, robots, random) do
+    {robot, random} = pick(random, robots)
+    {kind, random} = pick(random, [:random, :recorded, :mutated])
+    {count, random} = whole(random, 10, 300)
+    {seed, random} = whole(random, 0, 1_000_000)
+    {{:junk, robot, kind, count, seed}, random}
+  end
+
+  defp one(:flood, robots, random) do
+    {robot, random} = pick(random, robots)
+    {count, random} = whole(random, 5_000, 20_000)
+    {seed, random} = whole(random, 0, 1_000_000)
+    {{:flood, robot, count, seed}, random}
+  end
+
+  defp one(:formation, _robots, random) do
+    {kind, random} = pick(random, [:line, :wedge, :triangle, :diamond, :circle, :column])
+    {{:formation, kind}, random}
+  end
+
+  defp one(:landmark, _robots, random) do
+    {x, random} = :rand.uniform_s(random)
+    {y, random} = :rand.uniform_s(random)
+    {{:landmark, {x - 0.5, y - 0.5}}, random}
   end
 end

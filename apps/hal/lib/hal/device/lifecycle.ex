@@ -4,7 +4,7 @@ defmodule Hal.Device.Lifecycle do
   # life, arms and drives the wheels. Runs in the device's process.
   alias Hal.Twist
   alias Hal.Device.Arming
-  alias Hal.Device.{Confirmation, Liveness, Obedience, Publisher, State, Watchdog}
+  alias Hal.Device.{Confirmation, Liveness, Obedience, Publisher, State}
 
   @retry_ms 100
   @longest_retry_ms 5_000
@@ -33,7 +33,7 @@ defmodule Hal.Device.Lifecycle do
   @spec fail(State.t(), reason :: term(), inner :: term()) :: State.t()
   def fail(s, reason, inner) do
     s.driver.terminate(inner)
-    s = Publisher.health(%{Watchdog.unguard(s) | inner: :closed}, {:offline, reason})
+    s = Publisher.health(%{unguard(s) | inner: :closed}, {:offline, reason})
     s = if s.arming, do: become(s, Arming.lost(s.arming, reason)), else: s
     s |> Confirmation.closed() |> retry()
   end
@@ -202,7 +202,7 @@ defmodule Hal.Device.Lifecycle do
   @doc "Gives the driver a speed, and restarts the watchdog."
   @spec drive_on(State.t(), Twist.t()) :: State.t()
   def drive_on(%{inner: {:open, inner}} = s, twist) do
-    s = Watchdog.guard(s, twist)
+    s = guard(s, twist)
 
     case s.driver.drive(twist, inner) do
       {:ok, inner} ->
@@ -212,5 +212,30 @@ defmodule Hal.Device.Lifecycle do
       {:error, reason, inner} ->
         fail(s, reason, inner)
     end
+  end
+
+  # Stops wheels that have received no further speed for 500 ms: the second line of defence behind the gate. Its message
+  # `{:watchdog, ref}` counts only while `ref` is the one in the state.
+
+  @watchdog_ms 500
+
+  # Restarts the watchdog for a speed that is given now; a stop only ends it.
+  defp guard(s, twist) do
+    s = unguard(s)
+
+    if Twist.zero?(twist) do
+      s
+    else
+      ref = make_ref()
+      %{s | watchdog: {Process.send_after(self(), {:watchdog, ref}, @watchdog_ms), ref}}
+    end
+  end
+
+  # Ends the watchdog.
+  defp unguard(%{watchdog: nil} = s), do: s
+
+  defp unguard(%{watchdog: {timer, _ref}} = s) do
+    Process.cancel_timer(timer)
+    %{s | watchdog: nil}
   end
 end

@@ -1,10 +1,10 @@
 defmodule Hal.Device.Server do
   @moduledoc false
   # Runs the process of a device (`Hal.Device`): it receives messages and decides the order of the work,
-  # which `Hal.Device.Lifecycle` and `Hal.Device.Requests` do.
+  # which `Hal.Device.Lifecycle` does.
   use GenServer
   alias Hal.Device.Arming
-  alias Hal.Device.{Confirmation, Lifecycle, Publisher, Requests, State}
+  alias Hal.Device.{Confirmation, Lifecycle, Obedience, Publisher, State}
   alias Hal.Twist
 
   @rest_ms 500
@@ -39,7 +39,7 @@ defmodule Hal.Device.Server do
   @impl GenServer
   def handle_continue(:open, s), do: {:noreply, open(s)}
 
-  defp open(s), do: s |> Lifecycle.open() |> Requests.ask() |> Requests.remind()
+  defp open(s), do: s |> Lifecycle.open() |> ask() |> remind()
 
   @impl GenServer
   def handle_call(:arming, _from, s), do: {:reply, s.arming, s}
@@ -76,10 +76,10 @@ defmodule Hal.Device.Server do
     do: {:noreply, Confirmation.ask(s, within_ms, reply)}
 
   def handle_cast({:look, pan, tilt}, %{kind: :ptz} = s),
-    do: {:noreply, Requests.keep(s, :look, [pan, tilt])}
+    do: {:noreply, keep(s, :look, [pan, tilt])}
 
   def handle_cast({:zoom, angle}, %{kind: :ptz} = s),
-    do: {:noreply, Requests.keep(s, :zoom, [angle])}
+    do: {:noreply, keep(s, :zoom, [angle])}
 
   @impl GenServer
   def handle_info({:open, ref}, %{retry: ref} = s), do: {:noreply, open(%{s | retry: nil})}
@@ -122,7 +122,7 @@ defmodule Hal.Device.Server do
     |> Confirmation.heard(readings)
     |> Lifecycle.measured(readings)
     |> Lifecycle.judge()
-    |> Requests.ask()
+    |> ask()
   end
 
   # The caller has been told by then that nothing was done, and may stand in front of the
@@ -158,4 +158,35 @@ defmodule Hal.Device.Server do
       @rest_ms -> :ok
     end
   end
+
+  # Gives a driver the requests other than speeds: the direction and zoom of a pan-tilt unit, and a
+  # camera's next picture. The last direction and zoom are kept, and repeated to a reopened driver.
+
+  # Keeps a request, and passes it to the driver if that is open and has this callback.
+  defp keep(s, callback, arguments),
+    do: carry_out(%{s | requests: Map.put(s.requests, callback, arguments)}, callback)
+
+  # Repeats the kept requests to a driver that has just been opened.
+  defp remind(s), do: s.requests |> Map.keys() |> Enum.reduce(s, &carry_out(&2, &1))
+
+  # Asks a camera for its next picture; called once the last one has been passed on.
+  defp ask(%{kind: :camera, inner: {:open, inner}} = s),
+    do: Lifecycle.done(s, s.driver.next(inner))
+
+  defp ask(s), do: s
+
+  defp carry_out(%{inner: {:open, inner}} = s, callback) do
+    arguments = s.requests[callback] ++ [inner]
+
+    if function_exported?(s.driver, callback, length(arguments)),
+      do: s |> told(callback) |> Lifecycle.done(apply(s.driver, callback, arguments)),
+      else: s
+  end
+
+  defp carry_out(s, _callback), do: s
+
+  defp told(%{requests: %{look: [pan, tilt]}} = s, :look),
+    do: %{s | obedience: Obedience.told(s.obedience, {pan, tilt})}
+
+  defp told(s, _callback), do: s
 end

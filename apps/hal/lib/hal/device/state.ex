@@ -5,15 +5,14 @@ defmodule Hal.Device.State do
 
   | module | what it does |
   |---|---|
-  | `Hal.Device.Server` | the process: receives messages and decides the order of the work |
-  | `Hal.Device.Lifecycle` | opens and closes the driver, judges it, drives the wheels |
-  | `Hal.Device.Requests` | requests to a camera or a pan-tilt unit |
-  | `Hal.Device.Watchdog` | stops wheels that receive no further speed |
+  | `Hal.Device.Server` | the process: receives messages and decides the order of the work; requests to a camera or a pan-tilt unit |
+  | `Hal.Device.Lifecycle` | opens and closes the driver, judges it, drives the wheels, stops those that receive no further speed |
   | `Hal.Device.Publisher` | reports changes to sinks and events |
   | `Hal.Device.Liveness`, `Hal.Device.Obedience`, `Hal.Device.Arming` | pure: whether it shows signs of life; whether it does what it is told; whether wheels may turn |
   """
   alias Hal.Device.Arming
-  alias Hal.Device.{Liveness, Obedience, Options}
+  alias Hal.Device.{Liveness, Obedience}
+  alias Hal.Options
 
   @enforce_keys [:kind, :device, :driver, :options, :sinks, :clock]
   defstruct @enforce_keys ++
@@ -79,9 +78,40 @@ defmodule Hal.Device.State do
   `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
-  def new!(options), do: struct!(__MODULE__, Options.check!(options))
+  def new!(options), do: struct!(__MODULE__, check!(options))
 
   @doc "The time by the device's clock, in milliseconds."
   @spec now(t()) :: integer()
   def now(%__MODULE__{clock: {m, f, a}}), do: apply(m, f, a)
+
+  # Checks the options of `Hal.Device`, where they are listed. Pure.
+
+  @table [
+    kind: [{:one_of, [:drive, :ptz, :camera]}, required: true],
+    driver: [:driver, required: true],
+    device: [{:check, &is_atom/1, "a name"}, default: nil],
+    arm: [{:one_of, [:auto, :manual, :never]}, default: :auto],
+    sonar: [:boolean, default: false],
+    was: [:mfa, default: nil],
+    disarmed: [:mfa, default: nil],
+    about: [{:check, &is_map/1, "a map"}, default: %{}],
+    sinks: [{:list, :mfa}, default: []],
+    clock: [:mfa, default: {System, :monotonic_time, [:millisecond]}]
+  ]
+
+  # The fields of a device's state; an `ArgumentError` names the option, its value and what is
+  # allowed.
+  defp check!(options) do
+    options = Options.check!(options, @table, "device")
+    {driver, driver_options} = options[:driver]
+
+    Keyword.take(options, [:kind, :was, :disarmed, :about, :sinks, :clock]) ++
+      [
+        device: options[:device] || options[:kind],
+        driver: driver,
+        options: driver_options,
+        arming: if(options[:kind] == :drive, do: Arming.new(options[:arm])),
+        sonar?: options[:sonar]
+      ]
+  end
 end

@@ -81,7 +81,7 @@ defmodule Robot.File.Schema do
         tilt_rate: {:number, 0.01, 10.0, "rad/s"}}}
   end
 
-  # `Robot.File.CrossChecks` compares them with the profile.
+  # `Robot.File` compares them with the profile.
   defp limits do
     {:keys,
      max_linear: {:number, 0.01, 10.0, "m/s"},

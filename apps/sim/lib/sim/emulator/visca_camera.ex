@@ -11,7 +11,7 @@ defmodule Sim.Emulator.ViscaCamera do
   @behaviour Sim.Emulator.Core
   import Sim.Emulator.ViscaCamera.State, only: [answer: 3, settle: 2]
   alias Sim.Emulator.ViscaCamera
-  alias Sim.Emulator.ViscaCamera.{Commands, Head, Inquiries, Options, Packet}
+  alias Sim.Emulator.ViscaCamera.{Commands, Head, Options, Packet}
 
   # How often a command to the body is repeated.
   @repeat_ms 100
@@ -58,7 +58,7 @@ defmodule Sim.Emulator.ViscaCamera do
     do: camera |> ViscaCamera.State.clear() |> answer(<<0x50>>, at_ms)
 
   defp understand(camera, {:to_me, <<0x09, what::binary>>}, at_ms) do
-    case Inquiries.ask(camera, what) do
+    case ask(camera, what) do
       {:ok, bytes} -> answer(camera, <<0x50, bytes::binary>>, at_ms)
       {:error, code} -> answer(camera, <<0x60, code>>, at_ms)
     end
@@ -96,4 +96,36 @@ defmodule Sim.Emulator.ViscaCamera do
     |> Enum.reject(&is_nil/1)
     |> Enum.min(fn -> nil end)
   end
+
+  # Answers the inquiries to a camera (fact sheet VISCA, section 4). Pure.
+
+  # The data of an answer, or the code of an error: 2 for an unknown inquiry, 0x41 while it is
+  # switched off.
+  # Vendor, model, release of the firmware, sockets.
+  defp ask(_camera, <<0x00, 0x02>>), do: {:ok, <<0x00, 0x20, 0x04, 0x02, 0x01, 0x00, 0x02>>}
+  defp ask(camera, <<0x04, 0x00>>), do: {:ok, flag(camera.power == :on)}
+  defp ask(%{power: :on, head: head} = camera, what), do: asked(what, head, camera)
+
+  defp ask(camera, what) do
+    with {:ok, _bytes} <- asked(what, camera.head, camera), do: {:error, 0x41}
+  end
+
+  defp asked(<<0x04, 0x47>>, head, _camera), do: {:ok, Packet.nibbles(round(head.zoom))}
+  defp asked(<<0x04, 0x38>>, _head, camera), do: {:ok, flag(camera.focus == :auto)}
+
+  defp asked(<<0x06, 0x12>>, head, _camera),
+    do: {:ok, Packet.nibbles(round(head.pan)) <> Packet.nibbles(round(head.tilt))}
+
+  defp asked(<<0x06, 0x11>>, _head, _camera), do: {:ok, <<0x18, 0x14>>}
+
+  # The meaning of the bits is unknown; one tells whether the head is moving to a position.
+  defp asked(<<0x06, 0x10>>, head, _camera),
+    do: {:ok, if(Head.going?(head), do: <<0x04, 0x00>>, else: <<0x00, 0x00>>)}
+
+  defp asked(<<0x06, 0x06>>, _head, camera), do: {:ok, flag(camera.screen == :on)}
+  defp asked(<<0x06, 0x23>>, _head, _camera), do: {:ok, <<0x01>>}
+  defp asked(_nonsense, _head, _camera), do: {:error, 0x02}
+
+  defp flag(true), do: <<0x02>>
+  defp flag(false), do: <<0x03>>
 end

@@ -4,7 +4,7 @@ defmodule Sim.Floorplan.Search do
   # them. Pure.
   alias Hal.Pose
   alias Sim.Floorplan
-  alias Sim.Floorplan.{Clearance, Flood, Cells, Packing, Rooms}
+  alias Sim.Floorplan.{Clearance, Cells, Packing, Rooms}
 
   # Metres. Half the width of a way, and the distance of a start place from walls: as a rule, and
   # beyond a robot's radius where there is no more room.
@@ -108,7 +108,7 @@ defmodule Sim.Floorplan.Search do
     near? = fn cell -> Pose.distance(Cells.point(map, cell), place) <= @beside end
 
     with true <- low > 0,
-         {_which, cells, _passed} = Flood.reach(map, Cells.cell(map, place), low, way, 1),
+         {_which, cells, _passed} = reach(map, Cells.cell(map, place), low, way, 1),
          cell when is_integer(cell) <- Enum.find(cells, near?),
          {:ok, poses} <- around(fleet, level, cell, place) do
       {:ok, place, poses}
@@ -123,12 +123,54 @@ defmodule Sim.Floorplan.Search do
     do: around(fleet, level, cell, landmark, @cells * max(length(fleet.robots), 10))
 
   defp around(fleet, {way, start} = level, cell, landmark, enough) do
-    {which, cells, passed} = Flood.reach(fleet.map, cell, way, start, enough)
+    {which, cells, passed} = reach(fleet.map, cell, way, start, enough)
 
     case Packing.place(fleet.map, cells, length(fleet.robots), fleet.seed, landmark) do
       {:ok, poses} -> {:ok, poses}
       {:full, _fit} when which == :some -> around(fleet, level, cell, landmark, 4 * enough)
       {:full, fit} -> {:full, fit, passed}
     end
+  end
+
+  # Finds what can be reached from a place by free ways of a certain width. Pure.
+
+  # The cells that are reached from cell `from` over cells whose byte in the field is at least
+  # `way`, and whose own is at least `good`: at least `enough` of them unless there are no more, then
+  # `:all`. With both the whole area that was passed.
+  defp reach(map, from, way, good, enough) do
+    if :binary.at(map.field, from) >= way,
+      do: wave(map, [from], MapSet.new([from]), way, good, {enough, 0, []}),
+      else: {:all, [], MapSet.new()}
+  end
+
+  defp wave(_map, [], seen, _way, _good, {_enough, _count, found}),
+    do: {:all, Enum.reverse(found), seen}
+
+  defp wave(_map, _front, seen, _way, _good, {enough, count, found}) when count >= enough,
+    do: {:some, Enum.reverse(found), seen}
+
+  defp wave(map, front, seen, way, good, {enough, count, found}) do
+    {count, found} =
+      Enum.reduce(front, {count, found}, fn cell, {count, found} ->
+        if :binary.at(map.field, cell) >= good,
+          do: {count + 1, [cell | found]},
+          else: {count, found}
+      end)
+
+    {next, seen} =
+      Enum.reduce(front, {[], seen}, fn cell, acc ->
+        Enum.reduce([-map.width, -1, 1, map.width], acc, &step(map, cell + &1, cell, way, &2))
+      end)
+
+    wave(map, Enum.reverse(next), seen, way, good, {enough, count, found})
+  end
+
+  # A neighbour on the plan: a row neither ends in the next one, nor does the plan go on.
+  defp step(map, to, from, way, {next, seen}) do
+    if to >= 0 and to < byte_size(map.field) and
+         abs(rem(to, map.width) - rem(from, map.width)) <= 1 and
+         :binary.at(map.field, to) >= way and not MapSet.member?(seen, to),
+       do: {[to | next], MapSet.put(seen, to)},
+       else: {next, seen}
   end
 end
