@@ -13,7 +13,7 @@ defmodule Swarm.Blackboard.State do
   #
   # Memory is bounded (`limits`): other robots, keys of a robot and hints (the newest stay), bytes of
   # a value.
-  alias Swarm.Blackboard.{Expiry, Incarnation, Rows}
+  alias Swarm.Blackboard.{Incarnation, Rows}
   alias Swarm.Wire.CounterGuard
 
   @limits %{robots: 256, keys: 32, bytes: 59_000, hints: 256, hint_bytes: 1_000}
@@ -143,7 +143,7 @@ defmodule Swarm.Blackboard.State do
     # Two nodes that send each other in turn what the other has just forgotten would never get rid
     # of it.
     owners = for {owner, _, _, _, _} <- incoming, uniq: true, do: owner
-    {rows, _gone} = Expiry.forget(rows, now_ms, owners)
+    {rows, _gone} = forget_old(rows, now_ms, owners)
 
     {rows, notes |> Enum.reverse() |> Enum.uniq()}
   end
@@ -220,8 +220,44 @@ defmodule Swarm.Blackboard.State do
   """
   @spec forget(t(), integer()) :: {t(), gone :: [{Rows.owner(), key()}]}
   def forget(rows, now_ms),
-    do: Expiry.forget(rows, now_ms, for({owner, _} <- Rows.owners(rows), do: owner))
+    do: forget_old(rows, now_ms, for({owner, _} <- Rows.owners(rows), do: owner))
 
   defp bytes(value) when is_binary(value), do: byte_size(value)
   defp bytes(value), do: :erlang.external_size(value)
+
+  # Decides which rows a board forgets once they are ten minutes old: robots of which nothing is newer,
+  # words of former lives, and deleted hints; words of this life of this node's own robots never.
+  # Pure.
+
+  @forget_ms 600_000
+
+  # Forgets what is old of these owners.
+  defp forget_old(state, now_ms, owners) do
+    gone =
+      for owner <- owners,
+          all = Rows.of(state, owner),
+          old = for({_, {_, _, at_ms}} = row <- all, now_ms - at_ms >= @forget_ms, do: row),
+          {key, {stamp, value, _}} <- old,
+          past?(state, owner, stamp, value, length(old) == map_size(all)),
+          do: {owner, key}
+
+    {Enum.reduce(gone, state, &drop/2), gone}
+  end
+
+  defp past?(_state, bucket, _stamp, value, _all?) when is_integer(bucket), do: value == ""
+
+  defp past?(state, robot, {incarnation, _}, _value, all?) do
+    {{life, _}, _, _} = Rows.latest(state, robot)
+    incarnation < life or (all? and not is_map_key(state.own, robot))
+  end
+
+  defp drop({bucket, id}, state) when is_integer(bucket),
+    do: %{state | hints: Map.delete(state.hints, id)}
+
+  defp drop({robot, key}, state) do
+    case Map.delete(Rows.of(state, robot), key) do
+      none when none == %{} -> %{state | robots: Map.delete(state.robots, robot)}
+      left -> %{state | robots: Map.put(state.robots, robot, left)}
+    end
+  end
 end

@@ -2,20 +2,14 @@ defmodule Tools.Calibrate.Odometry do
   @moduledoc false
   # Runs `mix calibrate odometry`: lets a robot drive courses, asks for tape measurements, estimates the errors of its
   # odometry, and writes the corrections into the robot's file.
-  alias Tools.Calibrate.{
-    Live,
-    Options,
-    Plan,
-    Question,
-    Report,
-    RobotFile,
-    Simulated,
-    StdinPrompt
-  }
+  alias Tools.Calibrate.{Live, Options, Plan, Report, RobotFile, Simulated, StdinPrompt}
 
   alias Console.Cli.Output
   alias Robot.Calibration
   alias Robot.Calibration.{Drive, Keys}
+  alias Console.Cli.Format
+  alias Hal.Cli.Parse
+  alias Hal.Pose
 
   @degree :math.pi() / 180
 
@@ -129,11 +123,11 @@ defmodule Tools.Calibrate.Odometry do
   end
 
   defp measure(task, driven, file, options, talk) do
-    {question, check} = Question.of(task)
+    {question, check} = question(task)
 
     case StdinPrompt.ask(talk, question, &answer(&1, check)) do
       {:ok, :again} -> course(task, file, options, talk)
-      {:ok, value} -> [{task, Map.merge(driven, Question.measured(task, value))}]
+      {:ok, value} -> [{task, Map.merge(driven, measured(task, value))}]
       :eof -> throw({:quit, "there was no answer; nothing is written"})
     end
   end
@@ -195,4 +189,32 @@ defmodule Tools.Calibrate.Odometry do
 
   defp put(keys, %{write: true, file: path}, _talk), do: RobotFile.write(path, keys, :always)
   defp put(keys, %{file: path}, talk), do: RobotFile.write(path, keys, talk || :never)
+
+  # Asks the questions after a course, and reads the answers. Pure.
+
+  # The question of a course, and the check of its answer (`Tools.Calibrate.StdinPrompt.ask/3`).
+  defp question({:distance, way}),
+    do:
+      {"How far is it from its mark, in a straight line, in metres? ",
+       &Parse.number(&1, way / 2, way * 2)}
+
+  defp question({:angle, turn}) do
+    far = abs(turn) / @degree
+
+    {"By how many degrees did it turn in all, such as #{Format.decimals(far, 0)}? ",
+     &Parse.number(&1, far / 2, far * 2)}
+  end
+
+  defp question({:square, _direction, _side}),
+    do:
+      {"Where does it stand, seen from its mark: X,Y in metres, ahead and to the left? ",
+       &Parse.point/1}
+
+  # The measurement: the pose at the end and the turn, as far as this course shows them.
+  defp measured({:distance, _way}, far), do: %{measured: Pose.new(far, 0), turn: 0.0}
+
+  defp measured({:angle, turn}, degrees),
+    do: %{measured: Pose.new(0, 0), turn: if(turn < 0, do: -degrees, else: degrees) * @degree}
+
+  defp measured({:square, _direction, _side}, {x, y}), do: %{measured: Pose.new(x, y), turn: 0.0}
 end
