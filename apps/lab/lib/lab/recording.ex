@@ -13,6 +13,7 @@ defmodule Lab.Recording do
   A tick is written in a short form (`Record.Recording.Tick`), and without compression: that would cost
   a run more than all the rest of its recording.
   """
+  alias Record.Recording, as: Shared
   alias Record.Recording.Tick
   alias Lab.Trial
   alias Lab.Trial.Setup
@@ -21,8 +22,6 @@ defmodule Lab.Recording do
   @start "/convoy/start"
   @ticks "/convoy/ticks"
   @encoding "erlang-term"
-  # The start holds the map and the world; a tick of a hundred robots takes some 0.3 MB.
-  @most_bytes 256_000_000
 
   @typedoc "A tick: its entries in their order, and the time at its end."
   @type tick :: {at_ms :: non_neg_integer(), [Trial.entry()]}
@@ -59,25 +58,23 @@ defmodule Lab.Recording do
   @doc "The start from its message."
   @spec read_start(binary()) :: {:ok, Setup.t()} | {:error, line :: String.t()}
   def read_start(bytes) do
-    case read(bytes) do
+    case Shared.read(bytes) do
       {:ok, {:convoy, @version, %Setup{world: %{map: map}} = setup}} ->
         {:ok, %{setup | map: map}}
 
       other ->
-        Record.Recording.refuse(other, :convoy, @version)
+        Shared.refuse(other, :convoy, @version)
     end
   end
 
   @doc "A tick from its message."
   @spec read_tick(binary()) :: {:ok, tick()} | {:error, line :: String.t()}
   def read_tick(bytes) do
-    with {:ok, {at_ms, packed}} when is_integer(at_ms) <- read(bytes),
+    with {:ok, {at_ms, packed}} when is_integer(at_ms) <- Shared.read(bytes),
          {:ok, entries} <- Tick.unpack(packed) do
       {:ok, {at_ms, entries}}
     else
       _other -> {:error, "has a tick that this program did not record"}
     end
   end
-
-  defp read(bytes), do: Record.Recording.read(bytes, @most_bytes)
 end

@@ -22,7 +22,8 @@ defmodule Record.Recording do
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"
-  # A second of a hundred robots takes some 30 MB, and in memory some four times as much.
+  # A second of a hundred robots takes some 30 MB, and in memory some four times as much; a tick of a run some 0.3 MB, its start
+  # the map and the world.
   @most_bytes 256_000_000
 
   @typedoc "What is added to a robot's time (ms) for that of Unix, and its body."
@@ -66,10 +67,10 @@ defmodule Record.Recording do
   @spec read_robots(binary(), left :: non_neg_integer()) ::
           {:ok, robots(), left :: non_neg_integer()} | {:error, line :: String.t()}
   def read_robots(bytes, left \\ Names.most()) do
-    case read(bytes, @most_bytes) do
+    case read(bytes) do
       {:ok, {:convoy_robots, @version, names, robots}} when is_binary(robots) ->
         with {:ok, left} <- Names.know(names, left),
-             {:ok, %{} = robots} <- read(robots, @most_bytes),
+             {:ok, %{} = robots} <- read(robots),
              true <- Enum.all?(robots, &robot?/1) do
           {:ok, robots, left}
         else
@@ -83,7 +84,7 @@ defmodule Record.Recording do
   end
 
   @doc """
-  What is wrong with the first message of a recording (`read/2`), which is no tuple of this name and this version.
+  What is wrong with the first message of a recording (`read/1`), which is no tuple of this name and this version.
 
       iex> Record.Recording.refuse({:ok, {:convoy, 1, nil}}, :convoy, 5)
       {:error, "is a recording of version 1; this program reads version 5"}
@@ -111,7 +112,7 @@ defmodule Record.Recording do
   @doc "The entries from a message with some."
   @spec read_trace(binary(), robots()) :: {:ok, [Replay.entry()]} | {:error, line :: String.t()}
   def read_trace(bytes, robots) do
-    with {:ok, entries} when is_list(entries) <- read(bytes, @most_bytes),
+    with {:ok, entries} when is_list(entries) <- read(bytes),
          {:ok, entries} <- entries(entries, robots, []) do
       {:ok, entries}
     else
@@ -133,7 +134,7 @@ defmodule Record.Recording do
 
   defp write(term), do: :erlang.term_to_binary(term, [:deterministic, compressed: 6])
 
-  @doc "A recorded term that takes so many bytes of memory at most. Creates no atoms."
-  @spec read(binary(), most_bytes :: pos_integer()) :: {:ok, term()} | :error
-  def read(bytes, most_bytes), do: Hal.ExternalTerm.decode(bytes, most_bytes)
+  @doc "A recorded term, of a message of either kind of recording, of at most 256 MB in memory. Creates no atoms."
+  @spec read(binary()) :: {:ok, term()} | :error
+  def read(bytes), do: Hal.ExternalTerm.decode(bytes, @most_bytes)
 end
