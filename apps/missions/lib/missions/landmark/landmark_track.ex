@@ -42,8 +42,9 @@ defmodule Missions.Landmark.LandmarkTrack do
   # Without a picture for so long a robot counts as one without a camera, however short its pictures stop otherwise.
   @blind_ms 5_000
 
-  # An upright pole, in metres.
+  # An upright pole, in metres, and how much of that shows its colour: the edges of what is round are dark.
   @radius 0.15
+  @shown 0.13
 
   @doc "The radius of the landmark, in metres."
   @spec radius() :: float()
@@ -64,7 +65,7 @@ defmodule Missions.Landmark.LandmarkTrack do
 
       %{blob: blob, bearing: bearing} ->
         view = Sighting.field_of_view(percept)
-        distance = Sighting.distance(blob, picture.blobs, @radius, view)
+        distance = Sighting.distance(blob, picture.blobs, @shown, view)
         seen = distance && Sighting.place(picture.pose, bearing, distance)
         place = smooth(old && old.place, seen)
         there? = seen != nil or (place != nil and toward?(picture.pose, bearing, place))
@@ -138,7 +139,7 @@ defmodule Missions.Landmark.LandmarkTrack do
   def blind?(pictured_ms, now_ms), do: now_ms - pictured_ms >= @blind_ms
 
   defp about(%{clipped?: true, share: share} = blob, view) when share > @too_near_share,
-    do: Sighting.distance_by_width(blob, @radius, view)
+    do: Sighting.distance_by_width(blob, @shown, view)
 
   defp about(blob, _view), do: blob.distance
 
