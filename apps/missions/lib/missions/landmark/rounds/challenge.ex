@@ -5,11 +5,12 @@ defmodule Missions.Landmark.Rounds.Challenge do
   # | reason | it holds for | no earlier in a reign than |
   # |---|---|---|
   # | `nearer`: it sees the landmark nearer than the leader does, by 0.5 m or a fifth of the distance | 2 s | 10 s |
-  # | `gone`: the leader does not see the landmark, and this robot sees it elsewhere than the leader last said | 0.5 s | 3 s |
-  # | `blind`: the leader does not see the landmark, and this robot does, where it was | 3 s | 10 s |
+  # | `gone`: the leader does not see the landmark, and this robot sees it elsewhere than the leader last said, and is nearer to it | 0.5 s | 3 s |
+  # | `blind`: the leader does not see the landmark, and this robot does | 3 s | 10 s |
   #
   # So leadership cannot oscillate. As long as the landmark has not moved, a robot that passes it on the way to its slot does
   # not challenge the leader. Of several that could ask, the one that sees it largest does, because a round elects that. Pure.
+  alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack, SlotPoses}
 
@@ -49,15 +50,24 @@ defmodule Missions.Landmark.Rounds.Challenge do
     end
   end
 
-  defp reason(nil, %{sight: sight, percept: %{pose: pose}, anchor: anchor}) do
-    there = anchor && SlotPoses.landmark(anchor)
-    if pose != nil and LandmarkTrack.elsewhere?(sight, pose, there), do: :gone, else: :blind
-  end
+  defp reason(nil, mission), do: if(gone?(mission), do: :gone, else: :blind)
 
   defp reason(theirs, mission) do
     if (mission.follower.in_place? or moved?(mission)) and nearer?(mission.sight, theirs),
       do: :nearer
   end
+
+  # A leader that is nearer may only have lost it behind a corner, and follows it there.
+  defp gone?(%{sight: sight, percept: %{pose: pose}, anchor: %{} = anchor, now_ms: now} = mission)
+       when pose != nil do
+    {leader, _twist} = SlotPoses.leader(anchor, now - mission.anchor_ms)
+
+    LandmarkTrack.elsewhere?(sight, pose, SlotPoses.landmark(anchor)) and
+      Pose.distance(pose, LandmarkTrack.where(sight)) <
+        Pose.distance(leader, LandmarkTrack.where(sight))
+  end
+
+  defp gone?(_knows_no_place), do: false
 
   defp nearer?(%{distance: mine}, %{distance: theirs}) when mine == nil or theirs == nil,
     do: false
@@ -69,7 +79,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
        when place != nil and now != nil do
     {x, y} = place
     {nx, ny} = now
-    Hal.Pose.distance({x / 1000, y / 1000}, {nx / 1000, ny / 1000}) > @moved
+    Pose.distance({x / 1000, y / 1000}, {nx / 1000, ny / 1000}) > @moved
   end
 
   defp moved?(_mission), do: false
