@@ -11,9 +11,8 @@ defmodule Missions.Landmark.Follower do
   # that knows its place less well than to a metre: it cannot tell whether it comes nearer.
   alias Hal.Pose
   alias Missions.Landmark
-  alias Missions.Landmark.Follower.{Facing, Guide, Progress}
+  alias Missions.Landmark.Follower.{Facing, Gaze, Guide, Progress}
   alias Missions.Landmark.{Marks, SlotPoses}
-  alias Robot.Percept.CameraPointing
   alias Swarm.Formation.Chain
 
   @lease_ms 1_000
@@ -21,8 +20,6 @@ defmodule Missions.Landmark.Follower do
   @near 0.15
   @sure 1.0
   @slow 0.05
-  # The camera looks at the landmark and at the robot ahead in turn.
-  @gaze_ms 1_500
 
   defstruct in_place?: false,
             unsure?: false,
@@ -31,6 +28,7 @@ defmodule Missions.Landmark.Follower do
             landmark: nil,
             progress: %Progress{},
             facing: %Facing{},
+            gaze: %Gaze{},
             guide: %Guide{}
 
   @typedoc """
@@ -45,6 +43,7 @@ defmodule Missions.Landmark.Follower do
           landmark: {integer(), integer()} | nil,
           progress: Progress.t(),
           facing: Facing.t(),
+          gaze: Gaze.t(),
           guide: Guide.t()
         }
 
@@ -64,7 +63,7 @@ defmodule Missions.Landmark.Follower do
 
     if place == nil or age_ms > @lease_ms or mission.percept.pose == nil do
       {%{mission | follower: wait(mission.follower, age_ms)},
-       [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, look_out(mission)}]}
+       [{:goal, :stand, {Robot.Behaviour.Stop, []}}, {:look, Gaze.waiting(mission)}]}
     else
       follow(mission, place, age_ms)
     end
@@ -93,6 +92,7 @@ defmodule Missions.Landmark.Follower do
     {leader, _twist} = SlotPoses.leader(mission.anchor, age_ms)
     follower = mission.follower
     progress = Progress.note(follower.progress, mission, slot, error, there?)
+    gaze = Gaze.note(follower.gaze, mission, there?)
     vague? = not progress.blocked? and vague?(mission.percept)
 
     follower = %{
@@ -105,6 +105,7 @@ defmodule Missions.Landmark.Follower do
         # follow.
         landmark: landmark(mission, there?),
         progress: progress,
+        gaze: gaze,
         guide: Guide.note(follower.guide, mission, there? and sure?),
         facing: Facing.note(follower.facing, mission, slot, where(error, there?, sure?), leader)
     }
@@ -118,15 +119,17 @@ defmodule Missions.Landmark.Follower do
     goal = {:goal, {:slot, mission.epoch}, {Robot.Behaviour.Follow, options}}
     mission = %{mission | place: slot, follower: follower}
 
-    {mission, place ++ [goal, {:look, look(mission, age_ms)}, {:anchors, Marks.anchors(mission)}]}
+    {mission,
+     place ++ [goal, {:look, Gaze.pan(mission, leader)}, {:anchors, Marks.anchors(mission)}]}
   end
 
   defp vague?(%{uncertainty: %{radius: radius}}), do: radius > @sure
   defp vague?(_percept), do: false
 
-  defp target(%{facing: facing, guide: guide}, mission, slot, leader) do
+  defp target(%{facing: facing, guide: guide, gaze: gaze}, mission, slot, leader) do
     ahead = SlotPoses.landmark(mission.anchor) || Pose.point(leader)
-    Guide.turned(guide, mission, Facing.turned(facing, slot), ahead)
+    slot = Guide.turned(guide, mission, Facing.turned(facing, slot), ahead)
+    Gaze.turned(gaze, mission, slot)
   end
 
   defp where(_error, true, sure?), do: if(sure?, do: :in_place, else: :unsure)
@@ -143,42 +146,5 @@ defmodule Missions.Landmark.Follower do
     if news != follower.told and child != nil,
       do: {news, [{:claim, [child], %{anchor: anchor}}]},
       else: {follower.told, []}
-  end
-
-  # Pans towards the landmark and the robot ahead in turn, as far as they can be seen.
-  defp look(%{anchor: anchor, percept: percept} = mission, age_ms) do
-    {leader, _twist} = SlotPoses.leader(anchor, age_ms)
-    targets = [SlotPoses.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
-    turn = div(mission.now_ms, @gaze_ms)
-    {first, [second]} = List.pop_at(targets, rem(turn, 2))
-    guided = rem(turn, 4) > 1 && Guide.bearing(mission.follower.guide, mission)
-
-    if guided do
-      CameraPointing.pan(guided, percept)
-    else
-      Enum.find_value([first, second], 0.0, fn place ->
-        bearing = Pose.bearing(percept.pose, place)
-        if CameraPointing.within?(bearing, percept), do: CameraPointing.pan(bearing, percept)
-      end)
-    end
-  end
-
-  # The last known place of the landmark.
-  defp look_out(%{percept: %{pose: nil}}), do: 0.0
-
-  defp look_out(%{anchor: anchor, sight: sight, percept: percept}) do
-    place = (anchor && SlotPoses.landmark(anchor)) || (sight && sight.place)
-    bearing = if place, do: Pose.bearing(percept.pose, place), else: 0.0
-
-    if CameraPointing.within?(bearing, percept),
-      do: CameraPointing.pan(bearing, percept),
-      else: 0.0
-  end
-
-  defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do
-    case anchor.order |> Enum.take_while(&(&1 != mission.me)) |> List.last() do
-      nil -> Pose.point(leader)
-      id -> if peer = percept.peers[id], do: Pose.point(peer.pose), else: Pose.point(leader)
-    end
   end
 end

@@ -7,8 +7,13 @@ defmodule Missions.Landmark.LandmarkTrack do
   alias Robot.Percept.Sighting
 
   @enforce_keys [:at_ms, :size_ppm, :bearing]
-  defstruct @enforce_keys ++ [distance: nil, place: nil, place_ms: nil, moving?: false]
+  defstruct @enforce_keys ++
+              [distance: nil, place: nil, place_ms: nil, rough: nil, moving?: false]
 
+  @typedoc """
+  `distance` and `place` are measured, in metres. `rough` is where the landmark seems to be if it was seen in another
+  direction than that place, and cannot be measured: a robot hides a part of it, or it is too near.
+  """
   @type t :: %__MODULE__{
           at_ms: integer(),
           size_ppm: pos_integer(),
@@ -16,6 +21,7 @@ defmodule Missions.Landmark.LandmarkTrack do
           distance: float() | nil,
           place: Pose.point() | nil,
           place_ms: integer() | nil,
+          rough: Pose.point() | nil,
           moving?: boolean()
         }
 
@@ -25,11 +31,20 @@ defmodule Missions.Landmark.LandmarkTrack do
   @jump 0.6
   @moving 0.1
 
+  # A clipped landmark that covers more of the picture is too near to be measured by its area.
+  @too_near_share 0.2
+  # Seen so far (radians) off the direction of its last place, it is not there any more.
+  @aside 0.5
+  # So far from where others say it is (metres, and per metre from which it was seen), it is somewhere else.
+  @elsewhere 1.0
+  @per_metre 0.25
+
   # Without a picture for so long a robot counts as one without a camera, however short its pictures stop otherwise.
   @blind_ms 5_000
 
-  # An upright pole, in metres.
+  # An upright pole, in metres, and how much of that shows its colour: the edges of what is round are dark.
   @radius 0.15
+  @shown 0.13
 
   @doc "The radius of the landmark, in metres."
   @spec radius() :: float()
@@ -50,10 +65,11 @@ defmodule Missions.Landmark.LandmarkTrack do
 
       %{blob: blob, bearing: bearing} ->
         view = Sighting.field_of_view(percept)
-        distance = Sighting.distance(blob, picture.blobs, @radius, view)
+        distance = Sighting.distance(blob, picture.blobs, @shown, view)
         seen = distance && Sighting.place(picture.pose, bearing, distance)
-
         place = smooth(old && old.place, seen)
+        there? = seen != nil or (place != nil and toward?(picture.pose, bearing, place))
+        about = if not there?, do: about(blob, view)
 
         %__MODULE__{
           at_ms: picture.at_ms,
@@ -62,6 +78,7 @@ defmodule Missions.Landmark.LandmarkTrack do
           distance: distance,
           place: place,
           place_ms: if(seen, do: picture.at_ms, else: old && old.place_ms),
+          rough: about && Sighting.place(picture.pose, bearing, about),
           moving?: seen != nil and place != nil and Pose.distance(seen, place) > @moving
         }
     end
@@ -72,8 +89,9 @@ defmodule Missions.Landmark.LandmarkTrack do
   stands still. The motion of a landmark that is clipped at the side cannot be seen.
   """
   @spec still?(t() | nil, integer(), pos_integer()) :: boolean()
-  def still?(%{place_ms: place_ms, moving?: false}, now_ms, ms) when place_ms != nil,
-    do: now_ms - place_ms <= ms
+  def still?(%{place_ms: place_ms, rough: nil, moving?: false}, now_ms, ms)
+      when place_ms != nil,
+      do: now_ms - place_ms <= ms
 
   def still?(_sight, _now_ms, _ms), do: false
 
@@ -82,10 +100,51 @@ defmodule Missions.Landmark.LandmarkTrack do
   def fresh?(nil, _now_ms, _ms), do: false
   def fresh?(%{at_ms: at_ms}, now_ms, ms), do: now_ms - at_ms <= ms
 
+  @doc """
+  Where the landmark is, as far as this robot has seen (map frame, metres).
+
+      iex> sight = %Missions.Landmark.LandmarkTrack{at_ms: 0, size_ppm: 9, bearing: 0.0, place: {2.0, 0.0}}
+      iex> for sight <- [sight, %{sight | rough: {0.5, 0.5}}, nil], do: Missions.Landmark.LandmarkTrack.where(sight)
+      [{2.0, 0.0}, {0.5, 0.5}, nil]
+  """
+  @spec where(t() | nil) :: Pose.point() | nil
+  def where(nil), do: nil
+  def where(%{rough: rough, place: place}), do: rough || place
+
+  @doc """
+  Whether the landmark was seen from here somewhere else than there (map frame, metres; `nil`: nobody says where it is).
+
+      iex> sight = %Missions.Landmark.LandmarkTrack{at_ms: 0, size_ppm: 9, bearing: 0.0, place: {8.0, 0.0}}
+      iex> for there <- [{9.5, 0.0}, {10.5, 0.0}, nil],
+      ...>   do: Missions.Landmark.LandmarkTrack.elsewhere?(sight, Hal.Pose.new(0, 0), there)
+      [false, true, true]
+  """
+  @spec elsewhere?(t(), Pose.t(), Pose.point() | nil) :: boolean()
+  def elsewhere?(sight, pose, there) do
+    case where(sight) do
+      nil ->
+        false
+
+      _place when there == nil ->
+        true
+
+      place ->
+        Pose.distance(place, there) > max(@elsewhere, @per_metre * Pose.distance(pose, place))
+    end
+  end
+
   @doc "Whether a robot that had its last picture then has had none for so long that no robot should count on its camera."
   @spec blind?(pictured_ms :: integer() | nil, now_ms :: integer()) :: boolean()
   def blind?(nil, _now_ms), do: false
   def blind?(pictured_ms, now_ms), do: now_ms - pictured_ms >= @blind_ms
+
+  defp about(%{clipped?: true, share: share} = blob, view) when share > @too_near_share,
+    do: Sighting.distance_by_width(blob, @shown, view)
+
+  defp about(blob, _view), do: blob.distance
+
+  defp toward?(pose, bearing, place),
+    do: abs(Pose.wrap(Pose.bearing(pose, place) - bearing)) <= @aside
 
   defp smooth(nil, seen), do: seen
   defp smooth(place, nil), do: place

@@ -9,7 +9,7 @@ defmodule Missions.Landmark.Leader do
   alias Swarm.Formation
   alias Swarm.Membership.NameSet
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, Merge, Shape}
+  alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Shape}
   alias Missions.Landmark.Leader.{Announcement, Loss, Slots}
 
   # A landmark farther off than this is driven after, to `Slots.near/0`.
@@ -261,7 +261,7 @@ defmodule Missions.Landmark.Leader do
 
   defp track(mission) do
     {near, far} = range(mission)
-    place = mission.sight && mission.sight.place
+    place = LandmarkTrack.where(mission.sight)
     options = [colour: mission.colour, near: near, far: far, place: place]
     {:goal, {:track, mission.epoch}, {Robot.Behaviour.TrackBlob, options}}
   end

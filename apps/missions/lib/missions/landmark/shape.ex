@@ -365,9 +365,9 @@ defmodule Missions.Landmark.Shape do
       for {_id, %{mode: :dead, pose: pose, radius: radius}} <- Enum.sort(mission.percept.peers),
           do: {pose.x, pose.y, radius}
 
-    case mission.sight do
-      %{place: {x, y}} -> [{x, y, LandmarkTrack.radius()} | dead]
-      _unknown -> dead
+    case LandmarkTrack.where(mission.sight) do
+      {x, y} -> [{x, y, LandmarkTrack.radius()} | dead]
+      nil -> dead
     end
   end
 

@@ -98,7 +98,7 @@ defmodule Missions.Landmark.State do
           trail: Swarm.Formation.Trail.t(),
           leadership: Missions.Landmark.Leader.t() | nil,
           follower: Missions.Landmark.Follower.t() | nil,
-          challenge: :open | {:nearer | :blind, since_ms :: integer()} | nil,
+          challenge: :open | {:nearer | :gone | :blind, since_ms :: integer()} | nil,
           of: non_neg_integer(),
           of_told:
             {{leader :: atom(), epoch :: pos_integer(), of :: pos_integer()},

@@ -17,7 +17,7 @@ defmodule Missions.Landmark.Leader.Announcement do
   @spec update(Landmark.State.t()) :: Landmark.State.t()
   def update(%{percept: percept, leadership: leadership} = mission) do
     sequence = leadership.sequence + 1
-    place = mission.sight && mission.sight.place
+    place = LandmarkTrack.where(mission.sight)
     {size, places} = leadership.shape.room
     kept = Loss.kept(mission, mission.order)
 

@@ -7,7 +7,7 @@ defmodule Missions.Landmark.Leader.Loss do
   # followers keep their places, whatever the leader does: a leader that turns on the spot would sweep the whole shape about.
   alias Hal.Pose
   alias Missions.Landmark
-  alias Missions.Landmark.SlotPoses
+  alias Missions.Landmark.{LandmarkTrack, SlotPoses}
   alias Swarm.Formation.Chain
 
   # It waits for so long. A new leader may have seen the landmark with its camera turned aside, and look ahead now.
@@ -76,10 +76,10 @@ defmodule Missions.Landmark.Leader.Loss do
   defp unseen_ms(%{sight: sight, since_ms: since_ms, now_ms: now}),
     do: now - max((sight && sight.at_ms) || since_ms, since_ms)
 
-  defp near?(%{sight: %{place: place}, percept: %{pose: pose}}) when place != nil and pose != nil,
-    do: Pose.distance(pose, place) <= @near
-
-  defp near?(_unknown), do: true
+  defp near?(%{sight: sight, percept: %{pose: pose}}) do
+    place = LandmarkTrack.where(sight)
+    place == nil or pose == nil or Pose.distance(pose, place) <= @near
+  end
 
   @doc "The end of what it did, by its tag."
   @spec ended(Landmark.State.t(), tag :: term(), outcome :: integer()) :: Landmark.State.t()
@@ -97,7 +97,7 @@ defmodule Missions.Landmark.Leader.Loss do
   @doc "What it does now instead of tracking the landmark; `nil` as long as it tracks it."
   @spec goal(Landmark.State.t()) :: Robot.Mission.effect() | nil
   def goal(%{leadership: %{loss: %{step: :go, since_ms: since_ms}}} = mission) do
-    {x, y} = mission.sight.place
+    {x, y} = LandmarkTrack.where(mission.sight)
     {:goal, {:last_seen, since_ms}, {Robot.Behaviour.Goto, x: x, y: y, tolerance: @near}}
   end
 

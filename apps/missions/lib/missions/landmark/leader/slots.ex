@@ -2,7 +2,7 @@ defmodule Missions.Landmark.Leader.Slots do
   @moduledoc false
   # Chooses the order of a leader's followers, and the shape in whose slots they stand. Pure.
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, Merge, Rounds, Shape}
+  alias Missions.Landmark.{Claim, LandmarkTrack, Merge, Rounds, Shape}
   alias Missions.Landmark.Leader.Loss
   alias Swarm.Formation.{Assignment, Chain}
 
@@ -75,10 +75,10 @@ defmodule Missions.Landmark.Leader.Slots do
     size == count + 1 and Enum.sort(places) == Enum.to_list(1..count//1)
   end
 
-  defp landmark_distance(%{sight: %{place: place}, percept: percept}) when place != nil,
-    do: Hal.Pose.distance(percept.pose, place)
-
-  defp landmark_distance(_mission), do: @near
+  defp landmark_distance(%{sight: sight, percept: percept}) do
+    place = LandmarkTrack.where(sight)
+    if place, do: Hal.Pose.distance(percept.pose, place), else: @near
+  end
 
   defp used(_mission, %{spots: [_ | _] = spots}) do
     for spot <- spots, {x, y, _heading} = Landmark.State.millimetres(spot), do: {x, y}

@@ -1,19 +1,24 @@
 defmodule Missions.Landmark.Rounds.Challenge do
   @moduledoc false
-  # Decides when a follower asks for a new leader: it sees the landmark nearer than the leader
-  # does, by 0.5 m or a fifth of the distance, for 2 s; or the leader has not seen it for 3 s while
-  # this robot does. No leader is challenged in its first 10 s, so that leadership cannot oscillate;
-  # and as long as the landmark has not moved, a robot that passes it on the way to its slot does
-  # not challenge the leader. Pure.
+  # Decides when a follower asks for a new leader:
+  #
+  # | reason | it holds for | no earlier in a reign than |
+  # |---|---|---|
+  # | `nearer`: it sees the landmark nearer than the leader does, by 0.5 m or a fifth of the distance | 2 s | 10 s |
+  # | `gone`: the leader does not see the landmark, and this robot sees it elsewhere than the leader last said, and is not farther from it than the leader by 0.5 m | 0.5 s | 3 s |
+  # | `blind`: the leader does not see the landmark, and this robot does | 3 s | 10 s |
+  #
+  # So leadership cannot oscillate. As long as the landmark has not moved, a robot that passes it on the way to its slot does
+  # not challenge the leader. Of several that could ask, the one that sees it largest does, because a round elects that. Pure.
+  alias Hal.Pose
   alias Missions.Landmark
-  alias Missions.Landmark.Claim
+  alias Missions.Landmark.{Claim, LandmarkTrack, SlotPoses}
 
-  @dwell_ms 2_000
-  @blind_ms 3_000
-  @reign_ms 10_000
+  @terms %{nearer: {2_000, 10_000}, gone: {500, 3_000}, blind: {3_000, 10_000}}
   @least 500
   @share 0.2
   @moved 1.0
+  @farther 0.5
 
   @doc "`challenge` becomes `:open` when it is time to open a round."
   @spec update(Landmark.State.t()) :: Landmark.State.t()
@@ -23,10 +28,12 @@ defmodule Missions.Landmark.Rounds.Challenge do
         %{mission | challenge: nil}
 
       reason ->
+        {dwell_ms, reign_ms} = @terms[reason]
         since = since(mission.challenge, reason, mission.now_ms)
-        long? = mission.now_ms - since >= if(reason == :nearer, do: @dwell_ms, else: @blind_ms)
-        reigned? = mission.now_ms - mission.since_ms >= @reign_ms
-        %{mission | challenge: if(long? and reigned?, do: :open, else: {reason, since})}
+        long? = mission.now_ms - since >= dwell_ms
+        reigned? = mission.now_ms - mission.since_ms >= reign_ms
+        open? = long? and reigned? and largest?(mission)
+        %{mission | challenge: if(open?, do: :open, else: {reason, since})}
     end
   end
 
@@ -36,41 +43,55 @@ defmodule Missions.Landmark.Rounds.Challenge do
   defp since(_other, _reason, now_ms), do: now_ms
 
   defp reason(mission) do
-    peers = Landmark.State.beats(mission)
-
     with true <- Landmark.State.sees?(mission),
-         %{distance: mine} when mine != nil <- mission.sight,
-         %{phase: :lead} = leader <- peers[mission.leader],
-         sight = Claim.of(leader).sight,
-         mine = round(mine * 1000),
-         true <- nearest?(mine, mission.me, peers),
-         true <- mission.follower.in_place? or moved?(mission) or sight == nil do
-      case sight do
-        nil -> :blind
-        %{distance: nil} -> nil
-        %{distance: theirs} -> if mine < theirs - max(@least, theirs * @share), do: :nearer
-      end
+         %{phase: :lead} = leader <- Landmark.State.beats(mission)[mission.leader] do
+      reason(Claim.of(leader).sight, mission)
     else
       _unfit -> nil
     end
   end
 
+  defp reason(nil, mission), do: if(gone?(mission), do: :gone, else: :blind)
+
+  defp reason(theirs, mission) do
+    if (mission.follower.in_place? or moved?(mission)) and nearer?(mission.sight, theirs),
+      do: :nearer
+  end
+
+  # A leader that is nearer may only have lost it behind a corner, and follows it there.
+  defp gone?(%{sight: sight, percept: %{pose: pose}, anchor: %{} = anchor, now_ms: now} = mission)
+       when pose != nil do
+    {leader, _twist} = SlotPoses.leader(anchor, now - mission.anchor_ms)
+
+    LandmarkTrack.elsewhere?(sight, pose, SlotPoses.landmark(anchor)) and
+      Pose.distance(pose, LandmarkTrack.where(sight)) <
+        Pose.distance(leader, LandmarkTrack.where(sight)) + @farther
+  end
+
+  defp gone?(_knows_no_place), do: false
+
+  defp nearer?(%{distance: mine}, %{distance: theirs}) when mine == nil or theirs == nil,
+    do: false
+
+  defp nearer?(%{distance: mine}, %{distance: theirs}),
+    do: round(mine * 1000) < theirs - max(@least, theirs * @share)
+
   defp moved?(%{follower: %{landmark: place}, anchor: %{landmark: now}})
        when place != nil and now != nil do
     {x, y} = place
     {nx, ny} = now
-    Hal.Pose.distance({x / 1000, y / 1000}, {nx / 1000, ny / 1000}) > @moved
+    Pose.distance({x / 1000, y / 1000}, {nx / 1000, ny / 1000}) > @moved
   end
 
   defp moved?(_mission), do: false
 
-  # If several could ask, the nearest does.
-  defp nearest?(mine, me, peers) do
-    Enum.all?(peers, fn
+  # Of robots that see it equally large, each is the largest now and then.
+  defp largest?(%{sight: %{size_ppm: size}, me: me} = mission) do
+    Enum.all?(Landmark.State.beats(mission), fn
       {id, %{phase: :follow} = beat} ->
         case Claim.of(beat).sight do
-          %{distance: distance} when distance != nil -> {mine, me} < {distance, id}
-          _unknown -> true
+          %{size_ppm: other} -> {-size, me} < {-other, id}
+          nil -> true
         end
 
       _other ->
