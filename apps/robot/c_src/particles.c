@@ -89,25 +89,41 @@ void particles_scatter(particles_pose *poses, size_t count, const particles_map 
     }
 }
 
-/* How far a ray comes, in cells. */
-static double cast(const particles_map *map, double per, double u, double v, double c, double s, double most)
+/* How far a ray gets from each clearance (cells). */
+static void step_table(double per, double steps[256])
 {
-    double t = 0.0;
-    while (t < most) {
-        int clear = clear_at(map, u + t * c, v + t * s);
-        if (clear == 0)
-            return t;
+    steps[0] = 0.0;
+    for (int clear = 1; clear < 256; clear++) {
         double step = clear * per - OFF;
-        t = t + (step > LEAST_STEP ? step : LEAST_STEP);
+        steps[clear] = step > LEAST_STEP ? step : LEAST_STEP;
     }
-    return t;
+}
+
+/* How far the rays of a reading come (cells). Step by step side by side: one after the other, each would wait for memory. */
+static void cast(const particles_map *map, const double steps[256], double u, double v, const double rays[][2], int count,
+                 double most, double far[PARTICLES_RAYS])
+{
+    int going;
+
+    for (int r = 0; r < PARTICLES_RAYS; r++)
+        far[r] = r < count ? 0.0 : most;
+    do {
+        going = 0;
+        for (int r = 0; r < PARTICLES_RAYS; r++) {
+            int clear = far[r] < most ? clear_at(map, u + far[r] * rays[r][0], v + far[r] * rays[r][1]) : 0;
+            far[r] += steps[clear];
+            going |= clear;
+        }
+    } while (going);
 }
 
 void particles_weigh(const particles_pose *poses, size_t count, const particles_map *map, const particles_reading *readings,
                      size_t reading_count, const int16_t *tables, int32_t *weighed)
 {
-    const double cell = map->cell, per = UNIT / cell;
+    const double cell = map->cell;
+    double steps[256], rays[PARTICLES_RAYS][2], far[PARTICLES_RAYS];
 
+    step_table(UNIT / cell, steps);
     for (size_t k = 0; k < count; k++) {
         const particles_pose *pose = &poses[k];
         double c = cosine(pose->heading), s = sine(pose->heading);
@@ -123,17 +139,19 @@ void particles_weigh(const particles_pose *poses, size_t count, const particles_
                 double best = reading->most / cell;
                 /* Whether a wall is yet nearer makes no difference. */
                 double worst = (reading->range - FAR_OFF) / cell;
-                int rays = reading->counts > 0.0 ? PARTICLES_RAYS : 1;
+                int used = reading->counts > 0.0 ? PARTICLES_RAYS : 1;
                 const int16_t *table = tables;
 
-                for (int r = 0; r < rays && best > worst; r++) {
-                    double dx = reading->rays[r][0], dy = reading->rays[r][1];
-                    double t = cast(map, per, u, v, c * dx - s * dy, s * dx + c * dy, best);
-                    if (t < best - NEARER / cell) {
-                        best = t;
+                for (int r = 0; r < PARTICLES_RAYS; r++) {
+                    rays[r][0] = c * reading->rays[r][0] - s * reading->rays[r][1];
+                    rays[r][1] = s * reading->rays[r][0] + c * reading->rays[r][1];
+                }
+                cast(map, steps, u, v, rays, used, best, far);
+                for (int r = 0; r < used && best > worst; r++)
+                    if (far[r] < best - NEARER / cell) {
+                        best = far[r];
                         table = r > 2 ? tables + PARTICLES_TABLE : tables;
                     }
-                }
 
                 double longer = reading->range - best * cell;
                 double index = longer / UNIT + (PARTICLES_TABLE / 2 + 0.5);

@@ -88,16 +88,29 @@ defmodule Missions.Landmark.Follower.Gaze do
     targets = [SlotPoses.landmark(anchor) || Pose.point(leader), ahead(mission, leader)]
     turn = div(mission.now_ms, @turn_ms)
     {first, [second]} = List.pop_at(targets, rem(turn, 2))
-    guided = rem(turn, 4) > 1 && Guide.bearing(mission.follower.guide, mission)
+    aside = rem(turn, 4) > 1 && aside(mission, List.last(targets), turn)
 
-    if guided do
-      CameraPointing.pan(guided, percept)
+    if aside do
+      CameraPointing.pan(aside, percept)
     else
       Enum.find_value([first, second], 0.0, fn place ->
         bearing = Pose.bearing(percept.pose, place)
         if CameraPointing.within?(bearing, percept), do: CameraPointing.pan(bearing, percept)
       end)
     end
+  end
+
+  # The robots ahead may fill the picture up to its border. Beyond it an unsure robot sees where the nearest of them ends.
+  defp aside(
+         %{follower: %{guide: guide, unsure?: unsure?}, percept: percept} = mission,
+         ahead,
+         turn
+       ) do
+    half = percept.profile.camera.field_of_view / 2
+    bearing = Pose.bearing(percept.pose, ahead) + if(rem(turn, 2) == 0, do: half, else: -half)
+
+    Guide.bearing(guide, mission) ||
+      (unsure? and CameraPointing.within?(bearing, percept) and bearing)
   end
 
   defp ahead(%{anchor: anchor, percept: percept} = mission, leader) do
