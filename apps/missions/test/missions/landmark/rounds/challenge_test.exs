@@ -53,7 +53,14 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
     Enum.reduce_while(0..30_000//100, mission, fn past, mission ->
       now = from_ms + past
       peers = Map.new(mission.percept.peers, fn {id, peer} -> {id, %{peer | at_ms: now}} end)
-      mission = %{mission | now_ms: now, percept: %{mission.percept | peers: peers}}
+
+      mission = %{
+        mission
+        | now_ms: now,
+          anchor_ms: now,
+          percept: %{mission.percept | peers: peers}
+      }
+
       mission = Challenge.update(put_in(mission.sight.at_ms, now))
       if mission.challenge == :open, do: {:halt, past}, else: {:cont, mission}
     end)
@@ -106,7 +113,13 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
           put_in(mission.percept.peers[:min1], beside.(20_000 + rem(n, 2)).percept.peers.min1)
 
         peers = Map.new(mission.percept.peers, fn {id, peer} -> {id, %{peer | at_ms: now}} end)
-        mission = %{mission | now_ms: now, percept: %{mission.percept | peers: peers}}
+
+        mission = %{
+          mission
+          | now_ms: now,
+            anchor_ms: now,
+            percept: %{mission.percept | peers: peers}
+        }
 
         if mission.challenge == :open,
           do: mission,
