@@ -21,6 +21,7 @@ defmodule Robot.Localiser do
     Frame,
     History,
     MonteCarlo,
+    RingCheck,
     Sightings,
     TurnCheck,
     Walls
@@ -64,6 +65,7 @@ defmodule Robot.Localiser do
                 frame: nil,
                 frame_no: nil,
                 turn_check: nil,
+                ring_check: nil,
                 plan?: false,
                 walls: %Walls{},
                 seed: 0,
@@ -92,6 +94,7 @@ defmodule Robot.Localiser do
           frame: Anchors.frame() | nil,
           frame_no: non_neg_integer() | nil,
           turn_check: TurnCheck.t(),
+          ring_check: RingCheck.t() | nil,
           plan?: boolean(),
           walls: Walls.t(),
           seed: integer(),
@@ -187,6 +190,7 @@ defmodule Robot.Localiser do
       |> move(odometry.pose)
       |> remember(percept.at_ms)
       |> see(percept)
+      |> turn(percept)
       |> hear(percept)
       |> judged(percept)
       |> told()
@@ -326,6 +330,7 @@ defmodule Robot.Localiser do
         odometry: nil,
         history: History.new(),
         turn_check: nil,
+        ring_check: nil,
         plan?: false,
         walls: %Walls{},
         monte_carlo: nil,
@@ -371,6 +376,15 @@ defmodule Robot.Localiser do
         belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
         %{localiser | seen_ms: at_ms, belief: belief}
     end
+  end
+
+  # A correction of one that leads, or has led, would have to move all that follow it.
+  defp turn(%{anchors: %{walls?: false, standing: nil, frame: nil}} = localiser, _percept),
+    do: %{localiser | ring_check: nil}
+
+  defp turn(localiser, percept) do
+    {check, belief} = RingCheck.hear(localiser.ring_check, localiser.belief, percept)
+    %{localiser | ring_check: check, belief: belief}
   end
 
   @doc """

@@ -25,6 +25,8 @@ defmodule Swarm.Formation.Ladder do
   @beyond 0.4
   # Places are looked for along a trail in steps of this share of the spacing, and up to this many.
   @stride 0.5
+  # Places along a trail are at least this share of the spacing apart in a straight line, too.
+  @apart_share 0.7
   @strides 60
   # The gaps between robots of a cluster, from edge to edge: the first with which all see their leader, else the last.
   # How many places round the leader are tried, and how much finer they lie where too few of them are free, as in a
@@ -112,9 +114,15 @@ defmodule Swarm.Formation.Ladder do
         due? = way - last >= spacing - 1.0e-9
 
         cond do
-          length(spots) == followers -> {:halt, {spots, last}}
-          due? and fits?(place, spots, here, space) -> {:cont, {[place | spots], way}}
-          true -> {:cont, {spots, last}}
+          length(spots) == followers ->
+            {:halt, {spots, last}}
+
+          due? and apart?(place, [here.pose | spots], spacing) and
+              fits?(place, spots, here, space) ->
+            {:cont, {[place | spots], way}}
+
+          true ->
+            {:cont, {spots, last}}
         end
       end)
       |> elem(0)
@@ -168,6 +176,10 @@ defmodule Swarm.Formation.Ladder do
 
   defp told(formation, spots), do: {formation, FreeSlots.whole(length(spots)), spots}
   defp facing({x, y}, here), do: Pose.new(x, y, here.pose.heading)
+
+  # A trail may come near to where it was before.
+  defp apart?(place, others, spacing),
+    do: Enum.all?(others, &(Pose.distance(&1, Pose.point(place)) >= @apart_share * spacing))
 
   defp fits?(place, spots, here, space) do
     Space.free?(space, place) and not hides?(place, here) and

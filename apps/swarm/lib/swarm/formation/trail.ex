@@ -13,18 +13,38 @@ defmodule Swarm.Formation.Trail do
   @type t :: [Pose.point()]
 
   @doc """
-  The trail with one more pose; steps under 0.1 m are not recorded.
+  The trail with one more pose; steps under 0.1 m are not recorded. A robot that backs has no longer behind it what it passes. Where
+  one comes back to its trail, the loop is left out.
 
-      iex> [] |> Swarm.Formation.Trail.note(Hal.Pose.new(0, 0)) |> Swarm.Formation.Trail.note(Hal.Pose.new(0.05, 0)) |> length()
+      iex> alias Swarm.Formation.Trail
+      iex> [] |> Trail.note(Hal.Pose.new(0, 0)) |> Trail.note(Hal.Pose.new(0.05, 0)) |> length()
       1
+      iex> Trail.note([{3.0, 0.0}, {2.0, 0.0}, {1.0, 0.0}], Hal.Pose.new(1.6, 0))
+      [{1.6, 0.0}, {1.0, 0.0}]
+      iex> Trail.note([{3.0, 0.0}, {2.0, 0.0}, {1.0, 0.0}], Hal.Pose.new(2.04, 0, 3.1))
+      [{2.0, 0.0}, {1.0, 0.0}]
   """
   @spec note(t(), Pose.t()) :: t()
   def note([], pose), do: [Pose.point(pose)]
 
   def note([last | _] = trail, pose) do
     if Pose.distance(last, pose) >= @step,
-      do: Enum.take([Pose.point(pose) | trail], @most),
+      do: trail |> backed(pose) |> without_loop(pose) |> Enum.take(@most),
       else: trail
+  end
+
+  defp backed([last | _] = trail, pose) do
+    if ahead?(last, pose), do: Enum.drop_while(trail, &ahead?(&1, pose)), else: trail
+  end
+
+  defp ahead?({x, y}, %Pose{x: px, y: py, heading: heading}),
+    do: (x - px) * :math.cos(heading) + (y - py) * :math.sin(heading) > 0
+
+  defp without_loop(trail, pose) do
+    case Enum.find_index(trail, &(Pose.distance(&1, pose) < @step)) do
+      nil -> [Pose.point(pose) | trail]
+      back -> Enum.drop(trail, back)
+    end
   end
 
   @doc """

@@ -36,15 +36,40 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @carry_s 0.5
   @sonar_range 1.5
   @sonar_radius 0.05
+  # A robot that knows its place less well than this (metres) may hear others elsewhere, and would hear one up to so far away if it
+  # were there, not later than so far behind its front.
+  @unsure 1.0
+  @heard 2.0
+  @beyond 0.3
   # How far (metres) outside a known body an echo may be and still count as its echo.
   @explained 0.15
 
-  @doc "All other robots, nearest first, extrapolated to the present time."
+  @doc """
+  All other robots, nearest first, extrapolated to the present time. A robot that is not sure of its own place leaves out those that
+  its sonars would hear there, and do not: it is beside where it believes to be, and avoids what it hears.
+  """
   @spec robots(Percept.t()) :: [t()]
   def robots(%Percept{pose: pose} = percept) do
     # `keysort` keeps the order of what is equally near.
     discs = for {id, peer} <- Map.to_list(percept.peers), do: disc(id, peer, pose, percept)
+    discs = if unsure?(percept), do: Enum.reject(discs, &unheard?(&1, percept)), else: discs
     for {_gap, disc} <- :lists.keysort(1, Enum.map(discs, &{&1.gap, &1})), do: disc
+  end
+
+  defp unsure?(%{uncertainty: %{radius: radius}, sonar: [_ | _]}), do: radius > @unsure
+  defp unsure?(_percept), do: false
+
+  # A sonar points at its middle, and hears nothing up to well behind its front.
+  defp unheard?(%{at: at, radius: radius}, %{pose: pose, profile: profile, sonar: ranges}) do
+    Enum.zip(profile.sonars, ranges)
+    |> Enum.any?(fn {mount, range} ->
+      from = Pose.compose(pose, mount)
+      distance = Pose.distance(from, at)
+
+      distance < @heard and distance > radius and is_number(range) and
+        range > distance - radius + @beyond and
+        abs(Pose.bearing(from, at)) < min(profile.sonar_cone / 2, :math.asin(radius / distance))
+    end)
   end
 
   @doc """
