@@ -104,17 +104,25 @@ defmodule Sim.Floorplan.Search do
   """
   @spec about(fleet(), level(), Floorplan.point()) :: found()
   def about(%{map: map} = fleet, {way, _start} = level, place) do
-    low = min(way, Clearance.steps(map, place))
-    near? = fn cell -> Pose.distance(Cells.point(map, cell), place) <= @beside end
-
-    with true <- low > 0,
-         {_which, cells, _passed} = reach(map, Cells.cell(map, place), low, way, 1),
-         cell when is_integer(cell) <- Enum.find(cells, near?),
+    with cell when is_integer(cell) <- beside(map, {way, way}, place),
          {:ok, poses} <- around(fleet, level, cell, place) do
       {:ok, place, poses}
     else
       {:full, fit, _passed} -> {:full, fit}
-      _none -> {:full, 0}
+      nil -> {:full, 0}
+    end
+  end
+
+  @doc "The first cell, 3 m away at most, whose byte is at least `good`, by ways that are as wide as asked, or as the place."
+  @spec beside(Floorplan.t(), {way :: pos_integer(), good :: pos_integer()}, Floorplan.point()) ::
+          (cell :: non_neg_integer()) | nil
+  def beside(map, {way, good}, place) do
+    low = min(way, Clearance.steps(map, place))
+    near? = fn cell -> Pose.distance(Cells.point(map, cell), place) <= @beside end
+
+    if low > 0 do
+      {_which, cells, _passed} = reach(map, Cells.cell(map, place), low, good, 1)
+      Enum.find(cells, near?)
     end
   end
 

@@ -21,7 +21,7 @@ defmodule Sim.Floorplan.PlacesTest do
 
     file = Path.join(dir, "map.pgm")
     File.write!(file, ["P5 #{w} #{h} 255\n", pixels])
-    {:ok, map} = Floorplan.open("#{file}:#{width}x#{height}", 1)
+    {:ok, map} = Floorplan.open("#{file}:#{width}x#{height}", 1, options[:grey] || :wall)
     map
   end
 
@@ -184,6 +184,83 @@ defmodule Sim.Floorplan.PlacesTest do
     {:ok, {_x, y} = landmark, poses} = choose(map, 8)
     assert y > 0.5
     check(map, landmark, poses)
+  end
+
+  test "the grey of a drawing is wall, unless it is said to be floor", %{tmp_dir: dir} do
+    # A building in a grey margin, about a grey court in its middle.
+    shade = fn x, y ->
+      cond do
+        box?(x, y, {-3.0, -2.0, 3.0, 2.0}) -> 178
+        box?(x, y, {-3.1, -2.1, 3.1, 2.1}) -> 0
+        box?(x, y, {-7.0, -5.0, 7.0, 5.0}) -> 255
+        box?(x, y, {-7.1, -5.1, 7.1, 5.1}) -> 0
+        true -> 178
+      end
+    end
+
+    for seed <- 1..3 do
+      map = map(dir, {18, 14}, shade)
+      assert map.grey == 178
+      {:ok, {x, y} = landmark, poses} = choose(map, 5, seed)
+      refute box?(x, y, {-3.1, -2.1, 3.1, 2.1})
+      assert box?(x, y, {-7.0, -5.0, 7.0, 5.0})
+      check(map, landmark, poses)
+      assert {:error, line} = Floorplan.check_landmark(map, {0.0, 0.0})
+      assert line =~ ~r/there is a wall$/
+    end
+
+    map = map(dir, {18, 14}, shade, grey: :floor)
+    assert map.grey == nil
+    assert {:ok, place, _poses} = choose(map, 5)
+    assert place == {0.0, 0.0}
+  end
+
+  test "a landmark outside of a building that takes the fleet is refused", %{tmp_dir: dir} do
+    wall? = fn x, y, door? ->
+      box?(x, y, {-5.1, -4.1, 5.1, 4.1}) and not box?(x, y, {-5.0, -4.0, 5.0, 4.0}) and
+        not (door? and y > 0 and abs(x) < 0.5)
+    end
+
+    for {door?, {x, y} = place} <- [
+          {false, {7.0, 0.0}},
+          {true, {0.0, 5.2}},
+          {true, {5.4, 2.0}}
+        ] do
+      map = map(dir, {18, 14}, &wall?.(&1, &2, door?))
+      {:error, line} = choose(map, 5, 1, place)
+
+      assert line ==
+               "the landmark cannot stand at #{x},#{y}: that is outside of the building in map #{map.name}"
+
+      assert {:ok, {3.0, 0.0}, _poses} = choose(map, 5, 1, {3.0, 0.0})
+    end
+
+    # No building for so many.
+    map =
+      map(
+        dir,
+        {10, 8},
+        &(box?(&1, &2, {-2.1, -2.1, 2.1, 2.1}) and not box?(&1, &2, {-2.0, -2.0, 2.0, 2.0}))
+      )
+
+    assert {:ok, {4.0, 0.0}, _poses} = choose(map, 20, 1, {4.0, 0.0})
+  end
+
+  test "a closet without room for the fleet is refused, with how many would fit", %{
+    tmp_dir: dir
+  } do
+    # Of 2.6 x 2.6 m, in a hall.
+    map =
+      map(dir, {16, 12}, fn x, y ->
+        box?(x, y, {2.9, -0.1, 5.7, 2.7}) and not box?(x, y, {3.0, 0.0, 5.6, 2.6})
+      end)
+
+    {:error, line} = choose(map, 5, 1, {4.3, 1.3})
+
+    assert line =~
+             ~r/^5 robots cannot start in map .*: there is room for \d, with ways to the landmark at 4.3,1.3$/
+
+    assert {:ok, _landmark, _poses} = choose(map, 5)
   end
 
   test "a landmark that is given is reached round corners, through doors, close to a wall", %{
