@@ -28,6 +28,8 @@ defmodule Missions.Landmark.Shape do
 
   # So many blocked followers, if they are half of all, show that the shape does not fit.
   @many 3
+  # A follower that is faster (m/s) drives on.
+  @drives 0.05
   # What stands in a place of the cluster that a follower could not get to: its radius in metres, and how long.
   @barred 0.05
   @barred_ms 30_000
@@ -201,6 +203,7 @@ defmodule Missions.Landmark.Shape do
 
     case Ladder.choose([:cluster], asked, left, here, space) do
       nil ->
+        spots = swap(spots, barred?, here.stand)
         same = %{rung: :cluster, formation: shape.formation, room: shape.room, spots: spots}
         chosen(%{shape | barred: []}, same, whom, here, now)
 
@@ -211,6 +214,29 @@ defmodule Missions.Landmark.Shape do
           end)
 
         chosen(shape, %{choice | spots: spots, room: shape.room}, whom, here, now)
+    end
+  end
+
+  # Where no other place is left, one that stands in its own may be in the way of one that did not get to its: the nearest that
+  # is nearer than that. Then it moves up, and the other takes its place.
+  defp swap(spots, _barred?, stand) when length(stand) != length(spots), do: spots
+
+  defp swap(spots, barred?, stand) do
+    blocked = Enum.find_index(spots, barred?)
+    from = Enum.at(stand, blocked)
+    far = &Pose.distance(Enum.at(spots, &1), from)
+
+    nearer =
+      for k <- 0..(length(spots) - 1), k != blocked, far.(k) < far.(blocked), do: {far.(k), k}
+
+    case Enum.min(nearer, fn -> nil end) do
+      nil ->
+        spots
+
+      {_distance, k} ->
+        spots
+        |> List.replace_at(blocked, Enum.at(spots, k))
+        |> List.replace_at(k, Enum.at(spots, blocked))
     end
   end
 
@@ -361,14 +387,19 @@ defmodule Missions.Landmark.Shape do
     end
   end
 
-  # What the followers that are heard claim, each with its number in the order.
+  # What the followers that are heard claim, each with its number in the order. One that drives on, as on a long way that it
+  # drives slowly because it is unsure of its place, is not kept from it yet.
   defp followers(mission) do
     beats = Landmark.State.beats(mission)
 
-    for {id, index} <- Enum.with_index(mission.order),
-        beat = beats[id],
-        do: {index, Claim.of(beat)}
+    for {id, index} <- Enum.with_index(mission.order), beat = beats[id] do
+      claim = Claim.of(beat)
+      {index, %{claim | blocked: claim.blocked and not drives?(mission.percept.peers[id])}}
+    end
   end
+
+  defp drives?(%{twist: %{linear: linear}}), do: abs(linear) > @drives
+  defp drives?(_unheard), do: false
 
   defp bar(%{rung: :cluster, spots: [_ | _] = spots} = shape, mission) do
     blocked =

@@ -2,7 +2,7 @@ defmodule Sim.Floorplan.Places do
   @moduledoc """
   Chooses where the landmark and the robots of a run stand, if that is not given. Pure.
 
-  The landmark stands in the middle of the map, if the fleet has room about it. If not, in the room
+  The landmark stands in the middle of the map, if the fleet has room about it, and in a drawing gets past it. If not, in the room
   nearest the middle that takes the whole fleet; else where the fleet has room in several rooms, by
   ways of 0.8 m that lead to the landmark; else by ways that are just as wide as the robot. What
   lies outside of a building comes last: all this is tried with the rooms that do not reach the edge
@@ -21,9 +21,9 @@ defmodule Sim.Floorplan.Places do
         ) ::
           {:ok, Floorplan.point() | nil, [Pose.t()]} | {:error, String.t()}
   def choose(map, robots, seed, asked) do
-    fleet = %{map: map, robots: robots, seed: seed, asked: asked}
+    fleet = %{map: map, robots: robots, seed: seed, asked: asked, past?: false}
 
-    case if(astray?(fleet), do: :outside, else: fleet |> attempts() |> first(0)) do
+    case if(astray?(fleet), do: :outside, else: fleet |> past() |> first(0)) do
       :outside ->
         {x, y} = asked
 
@@ -37,6 +37,15 @@ defmodule Sim.Floorplan.Places do
         {:ok, landmark, poses}
     end
   end
+
+  # On a drawing, first places of the landmark that leave ways past it.
+  defp past(%{map: map, asked: :default} = fleet) do
+    if Maps.built_in?(map.name),
+      do: attempts(fleet),
+      else: attempts(%{fleet | past?: true}) ++ attempts(fleet)
+  end
+
+  defp past(fleet), do: attempts(fleet)
 
   # Each is tried when those before it have failed; the most robots that one had room for counts.
   defp first([], most), do: {:full, most}
@@ -99,12 +108,13 @@ defmodule Sim.Floorplan.Places do
   end
 
   # As on the maps that are made for a fleet: with straight ways to the landmark.
-  defp middle(%{map: map, robots: robots, seed: seed}, place) do
+  defp middle(%{map: map, robots: robots, seed: seed} = fleet, place) do
     with :ok <- if(place, do: Landmark.check(map, place), else: :ok),
-         {:ok, poses} <- Starts.spread(map, robots, seed, place) do
+         {:ok, poses} <- Starts.spread(map, robots, seed, place),
+         true <- not fleet.past? or Search.past?(fleet, place, poses) do
       {:ok, place, poses}
     else
-      {:error, _line} -> {:full, 0}
+      _wall_or_no_way -> {:full, 0}
     end
   end
 

@@ -35,7 +35,8 @@ defmodule Sim.Floorplan.PlacesTest do
   # Whether a disc comes from everywhere to everywhere among these places, on a grid of 10 cm.
   defp connected?(map, [from | places], radius) do
     node = fn {x, y} -> {round(x * 10), round(y * 10)} end
-    reached = spread(map, [node.(from)], MapSet.new([node.(from)]), radius)
+    free? = &Floorplan.free?(map, &1, radius)
+    reached = spread([node.(from)], MapSet.new([node.(from)]), free?)
 
     Enum.all?(places, fn place ->
       {i, j} = node.(place)
@@ -43,17 +44,17 @@ defmodule Sim.Floorplan.PlacesTest do
     end)
   end
 
-  defp spread(_map, [], reached, _radius), do: reached
+  defp spread([], reached, _free?), do: reached
 
-  defp spread(map, [{i, j} | rest], reached, radius) do
+  defp spread([{i, j} | rest], reached, free?) do
     new =
       for {a, b} <- [{1, 0}, {-1, 0}, {0, 1}, {0, -1}],
           node = {i + a, j + b},
           not MapSet.member?(reached, node),
-          Floorplan.free?(map, {(i + a) / 10, (j + b) / 10}, radius),
+          free?.({(i + a) / 10, (j + b) / 10}),
           do: node
 
-    spread(map, new ++ rest, MapSet.union(reached, MapSet.new(new)), radius)
+    spread(new ++ rest, MapSet.union(reached, MapSet.new(new)), free?)
   end
 
   defp check(map, landmark, poses, options \\ []) do
@@ -184,6 +185,33 @@ defmodule Sim.Floorplan.PlacesTest do
     {:ok, {_x, y} = landmark, poses} = choose(map, 8)
     assert y > 0.5
     check(map, landmark, poses)
+  end
+
+  test "a landmark in a corridor leaves ways past it from robot to robot", %{tmp_dir: dir} do
+    # A corridor of 1.6 m between rooms of 3.6 x 3.4 m, each with a door of 1 m to it.
+    wall? = fn x, y ->
+      beside = x - 4 * Float.round(x / 4)
+
+      abs(y) > 4.4 or abs(x) > 7.9 or
+        (abs(y) > 0.8 and abs(y) < 0.95 and abs(abs(beside) - 2.0) > 0.5) or
+        (abs(y) > 0.8 and abs(beside) < 0.08)
+    end
+
+    map = map(dir, {16, 9}, wall?)
+
+    for seed <- 1..6 do
+      {:ok, {lx, ly} = landmark, [first | others]} = choose(map, 5, seed)
+      check(map, landmark, [first | others], from_wall: 0.39)
+      free? = &(Floorplan.free?(map, &1, 0.3) and Pose.distance(&1, {lx, ly}) > 0.45)
+      node = fn pose -> {round(pose.x * 10), round(pose.y * 10)} end
+      reached = spread([node.(first)], MapSet.new([node.(first)]), free?)
+
+      for pose <- others do
+        {i, j} = node.(pose)
+        near = for a <- -1..1, b <- -1..1, do: {i + a, j + b}
+        assert Enum.any?(near, &MapSet.member?(reached, &1)), "seed #{seed}"
+      end
+    end
   end
 
   test "the grey of a drawing is wall, unless it is said to be floor", %{tmp_dir: dir} do
