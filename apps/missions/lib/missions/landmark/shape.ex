@@ -19,6 +19,7 @@ defmodule Missions.Landmark.Shape do
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack}
+  alias Missions.Landmark.Shape.Spots
 
   # How long followers have to take what they were given, places of a cluster longer.
   @step_ms 3_000
@@ -182,79 +183,39 @@ defmodule Missions.Landmark.Shape do
         space = %{space | bodies: bodies(mission)}
         choose(%{shape | barred: []}, whom, here, space, [:cluster], mission)
 
+      # Nor is there room now.
+      none?(shape, whom, here) ->
+        %{shape | fit_ms: mission.now_ms}
+
       # The request stays, so that the line that refuses it names it.
       true ->
-        chosen(shape, none(asked, followers, here, space), whom, here, mission.now_ms)
+        chosen(
+          shape,
+          %{
+            rung: nil,
+            formation: asked,
+            room: FreeSlots.whole(followers),
+            spots: Spots.most(asked, followers, here, space)
+          },
+          whom,
+          here,
+          mission.now_ms
+        )
     end
   end
 
-  # Only a robot that could not get to its place gets another one, if there is one.
-  defp refill(
-         %{spots: spots} = shape,
-         {asked, followers, _} = whom,
-         here,
-         space,
-         now
-       ) do
-    barred? = &List.keymember?(shape.barred, Pose.point(&1), 0)
-    kept = for spot <- spots, not barred?.(spot), do: {spot.x, spot.y, space.radius}
-    left = followers - length(kept)
-    space = %{space | bodies: space.bodies ++ kept}
-
-    case Ladder.choose([:cluster], asked, left, here, space) do
-      nil ->
-        spots = swap(spots, barred?, here.stand)
-        same = %{rung: :cluster, formation: shape.formation, room: shape.room, spots: spots}
-        chosen(%{shape | barred: []}, same, whom, here, now)
-
-      choice ->
-        {spots, []} =
-          Enum.map_reduce(spots, choice.spots, fn spot, others ->
-            if barred?.(spot), do: {hd(others), tl(others)}, else: {spot, others}
-          end)
-
-        chosen(shape, %{choice | spots: spots, room: shape.room}, whom, here, now)
-    end
+  # Only a robot that could not get to its place gets another one.
+  defp refill(%{spots: spots} = shape, {asked, _followers, _} = whom, here, space, now) do
+    barred = for {place, _at_ms} <- shape.barred, do: place
+    {left?, spots} = Spots.refill(spots, barred, asked, here, space)
+    choice = %{rung: :cluster, formation: asked, room: shape.room, spots: spots}
+    chosen(if(left?, do: shape, else: %{shape | barred: []}), choice, whom, here, now)
   end
 
-  # Where no other place is left, one that stands in its own may be in the way of one that did not get to its: the nearest that
-  # is nearer than that. Then it moves up, and the other takes its place.
-  defp swap(spots, _barred?, stand) when length(stand) != length(spots), do: spots
+  defp none?(%{rung: nil, chosen: {asked, followers, _, at}}, {asked, followers, _}, here),
+    do: Pose.distance(at, here.pose) <= @moved
 
-  defp swap(spots, barred?, stand) do
-    blocked = Enum.find_index(spots, barred?)
-    from = Enum.at(stand, blocked)
-    far = &Pose.distance(Enum.at(spots, &1), from)
-
-    nearer =
-      for k <- 0..(length(spots) - 1), k != blocked, far.(k) < far.(blocked), do: {far.(k), k}
-
-    case Enum.min(nearer, fn -> nil end) do
-      nil ->
-        spots
-
-      {_distance, k} ->
-        spots
-        |> List.replace_at(blocked, Enum.at(spots, k))
-        |> List.replace_at(k, Enum.at(spots, blocked))
-    end
-  end
-
-  # As many places as there are, and for the robots that are farthest from the leader those where they stand.
-  defp none(asked, followers, here, space) do
-    far = Enum.sort_by(here.stand, &(-Pose.distance(&1, here.pose)))
-
-    spots =
-      Enum.find_value((followers - 1)..1//-1, [], fn count ->
-        choice = Ladder.choose([:cluster], asked, count, here, space)
-        choice && choice.spots
-      end)
-
-    own = for {x, y} <- far, do: Pose.new(x, y, here.pose.heading)
-    spots = Enum.take(spots ++ own, followers)
-    spots = if spots != [] and length(spots) == followers, do: spots
-    %{rung: nil, formation: asked, room: FreeSlots.whole(followers), spots: spots}
-  end
+  defp none?(_shape, _whom, _here), do: false
 
   # Where the followers stand, in metres, as far as they are heard.
   defp stand(mission) do

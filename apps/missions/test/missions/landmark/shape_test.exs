@@ -106,7 +106,13 @@ defmodule Missions.Landmark.ShapeTest do
 
     shape = Shape.update(Shape.new(), put_in(mission.percept.grid, grid), 1.6)
     assert %{rung: nil, spots: [_, _, _, _]} = shape
+    assert Enum.uniq(shape.spots) == shape.spots
     for spot <- shape.spots, do: assert(Grid.free?(grid, Pose.point(spot), 0.2))
+
+    # They stay as long as there is no room, wherever the robots are by then.
+    later = put_in(%{mission | now_ms: 11_000}.percept.grid, grid)
+    later = put_in(later.percept.peers[:mag5].beat.pose, {-1_500, 0, 0})
+    assert Shape.update(shape, later, 1.6).spots == shape.spots
   end
 
   test "a place in which a robot has stood is kept, whatever sonars see there later" do
