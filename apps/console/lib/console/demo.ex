@@ -3,11 +3,12 @@ defmodule Console.Demo do
   Runs the demo without a view: the run in lockstep, its stages as lines, then report, picture and summary.
   """
   alias Console.{Fleet, Options, Picture, Report, Tables}
-  alias Console.Cli.{Format, Output}
+  alias Console.Cli.{Format, MapName, Output}
   alias Console.Picture.RunTrack
   alias Hal.Pose
   alias Nav.MapFile
   alias Lab.{Recorder, Run, Trial}
+  alias Sim.Floorplan.Maps
   alias Sim.Scene
   alias Lab.Recording.{Facts, Pictures}
   alias Lab.Trial.Coverage
@@ -139,29 +140,44 @@ defmodule Console.Demo do
   end
 
   @doc """
-  The first line of a run: the robots, the map, the seed and the formation, or the mission; and where the landmark
-  stands, if that was chosen and is not the origin.
+  The first line of a run: the robots, the map, whether grey in its picture was taken for wall, the seed and the formation, or
+  the mission; and where landmark and robots stand, if that was chosen: on a built-in map, whose middle is known, only of a
+  landmark that is not there.
   """
   @spec heading(Options.t(), Scene.t()) :: String.t()
   def heading(options, scene) do
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
-      "#{options.map}, seed #{options.seed}, " <> task(options, scene)
+      "#{options.map}#{MapName.grey(scene, "--grey floor")}, seed #{options.seed}, " <>
+      task(options, scene) <> places(options, scene)
   end
 
   defp task(%{mission: {module, _own}}, _scene) when module != Missions.Landmark,
     do: Swarm.MissionRegistry.name(module)
 
-  defp task(options, scene) do
-    {kind, spacing} = scene.formation
+  defp task(_options, %{formation: {kind, spacing}}),
+    do: "#{kind} with #{Format.decimals(spacing, 1)} m spacing"
 
-    "#{kind} with #{Format.decimals(spacing, 1)} m spacing" <>
-      landmark(options.landmark, scene.landmark)
+  defp places(options, scene) do
+    drawing? = not Maps.built_in?(options.map)
+    chosen? = options.landmark == :default and scene.landmark != nil
+    landmark? = chosen? and (drawing? or scene.landmark != {0.0, 0.0})
+
+    if(landmark?, do: "; the landmark stands at #{place(scene.landmark)}", else: "") <>
+      if(drawing?,
+        do: "; #{starts(for robot <- scene.robots, do: Pose.point(robot.pose))}",
+        else: ""
+      )
   end
 
-  defp landmark(:default, {x, y}) when x != 0.0 or y != 0.0,
-    do: "; the landmark stands at #{Format.decimals(x, 2)},#{Format.decimals(y, 2)}"
+  defp starts([place]), do: "the robot starts at #{place(place)}"
 
-  defp landmark(_asked, _place), do: ""
+  defp starts(places) do
+    {xs, ys} = Enum.unzip(places)
+
+    "the robots start between #{place({Enum.min(xs), Enum.min(ys)})} and #{place({Enum.max(xs), Enum.max(ys)})}"
+  end
+
+  defp place({x, y}), do: "#{Format.decimals(x, 2)},#{Format.decimals(y, 2)}"
 
   # Paths are kept only if a picture is wanted.
   defp track(%Options{picture: nil}, _scene), do: nil

@@ -15,6 +15,7 @@ defmodule Console.Options do
   defstruct robots: nil,
             seed: 1,
             map: "hall",
+            grey: :wall,
             start: :spread,
             landmark: :default,
             moves: [],
@@ -112,7 +113,7 @@ defmodule Console.Options do
   def trial(%__MODULE__{} = options) do
     options
     |> Map.take(
-      ~w(robots seed map start landmark moves kills loss noise formation assign leader_change blobs hardware)a
+      ~w(robots seed map grey start landmark moves kills loss noise formation assign leader_change blobs hardware)a
     )
     |> Map.put(:plan, plan(options))
     |> Map.put(:duration_s, duration_s(options))
@@ -151,6 +152,8 @@ defmodule Console.Options do
        "of all randomness; the same seed gives the same run (1)"},
       {"map", "NAME", &MapName.parse(&1, folder),
        "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT (or FILE.pgm) in metres (hall)"},
+      {"grey", "HOW", &Parse.choice(&1, wall: :wall, floor: :floor),
+       "what the grey of a picture is that seems to stand for what is unknown:\nwall, floor (wall)"},
       {"plan", "HOW", &Parse.choice(&1, none: :none, known: :known, sonar: :sonar),
        "whether robots have the floor plan (known), remember walls that their\nsonars saw (sonar), or do neither: known, sonar, none\n(known; with a mission that makes the map, such as explore: none)"},
       {"start", "HOW", &Parse.choice(&1, spread: :spread, same: :same),

@@ -21,12 +21,41 @@ defmodule Console.DemoTest do
     refute text =~ "\e["
   end
 
-  test "the first line says where the landmark stands if that was chosen, off the origin" do
-    first = fn line ->
-      options = Runs.options(line <> " --robots 1 --duration 1 --blobs direct --noise off")
-      {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
-      text |> String.split("\n") |> hd()
+  defp first(line) do
+    options = Runs.options(line <> " --duration 1 --blobs direct --noise off")
+    {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
+    text |> String.split("\n") |> hd()
+  end
+
+  @tag :tmp_dir
+  test "the first line says where all stand in a drawing, and that its grey is wall", %{
+    tmp_dir: dir
+  } do
+    # Grey, a frame of wall, and floor, in pixels of half a metre.
+    shade = fn n ->
+      cond do
+        n < 4 -> 204
+        n == 4 -> 0
+        true -> 255
+      end
     end
+
+    pixels =
+      for j <- 0..27, i <- 0..35, into: <<>>, do: <<shade.(Enum.min([i, 35 - i, j, 27 - j]))>>
+
+    file = Path.join(dir, "plan.pgm")
+    File.write!(file, "P5 36 28 255\n" <> pixels)
+    places = "-?\\d+\\.\\d\\d,-?\\d+\\.\\d\\d"
+
+    assert first("--map #{file}:18x14 --robots 3") =~
+             ~r/plan.pgm:18x14 \(grey is wall; --grey floor makes it floor\), seed 1, column with 1.0 m spacing; the landmark stands at 0.00,0.00; the robots start between #{places} and #{places}$/
+
+    assert first("--map #{file}:18x14 --robots 1 --grey floor --landmark 1,1") =~
+             ~r/plan.pgm:18x14, seed 1, column with 1.0 m spacing; the robot starts at #{places}$/
+  end
+
+  test "the first line says where the landmark stands if that was chosen, off the origin" do
+    first = &first(&1 <> " --robots 1")
 
     assert first.("--map ring") =~
              ~r/1.0 m spacing; the landmark stands at -?\d+\.\d\d,-?\d+\.\d\d$/

@@ -30,6 +30,7 @@ defmodule Console.OptionsTest do
              robots: options.robots,
              seed: 7,
              map: "hospital",
+             grey: :wall,
              start: :same,
              landmark: {-2.0, 1.0},
              moves: options.moves,

@@ -5,13 +5,17 @@ defmodule Sim.Floorplan do
 
   `field` has one byte per cell, rows from the lowest y: the distance to the nearest wall in
   cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
-  jump over free space. `room` is the rectangle where a fleet starts.
+  jump over free space. `room` is the rectangle where a fleet starts. `grey` is the shade of a picture that was taken for wall
+  because it seems to stand for what is unknown, `nil` if none was.
   """
   alias Nav.Grid
   alias Sim.Floorplan.{Cells, Clearance, Image, Landmark, Maps, Places, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [grey: nil]
+
+  @typedoc "What the grey of a picture is that seems to stand for what is unknown (`Nav.MapFile.Picture.unknown/1`)."
+  @type grey :: :wall | :floor
 
   @type point :: {x :: float(), y :: float()}
   @type rectangle :: {left :: float(), low :: float(), right :: float(), high :: float()}
@@ -21,13 +25,14 @@ defmodule Sim.Floorplan do
           height: pos_integer(),
           cell: float(),
           field: binary(),
-          room: rectangle()
+          room: rectangle(),
+          grey: byte() | nil
         }
 
   @doc """
   A map by its name, with room for a fleet of this size: one of `Sim.Floorplan.Maps`, a bitmap with
   its size in metres, such as `"floor.png:16x12"`, or a description as map_server writes it,
-  `"floor.yaml"`.
+  `"floor.yaml"`. `grey` is for bitmaps: a description says itself what is unknown.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
       iex> Sim.Floorplan.size(map)
@@ -36,9 +41,10 @@ defmodule Sim.Floorplan do
       iex> line =~ "map: expected hall, hospital, arena, "
       true
   """
-  @spec open(String.t(), pos_integer()) :: {:ok, t()} | {:error, String.t()}
-  def open(name, fleet) when fleet > 0 do
-    with fields when is_map(fields) <- Maps.draw(name, fleet) || Image.open(name) |> fields(),
+  @spec open(String.t(), pos_integer(), grey()) :: {:ok, t()} | {:error, String.t()}
+  def open(name, fleet, grey \\ :wall) when fleet > 0 do
+    with fields when is_map(fields) <-
+           Maps.draw(name, fleet) || name |> Image.open(grey) |> fields(),
          do: {:ok, struct!(__MODULE__, fields)}
   end
 

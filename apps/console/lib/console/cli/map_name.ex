@@ -70,6 +70,20 @@ defmodule Console.Cli.MapName do
     end
   end
 
+  @doc """
+  What is to be said behind the name of a map in whose picture grey was taken for wall; `option` is how to have it otherwise.
+
+      iex> Console.Cli.MapName.grey(%{map: %{grey: 178}}, "--grey floor")
+      " (grey is wall; --grey floor makes it floor)"
+      iex> Console.Cli.MapName.grey(%{map: %{grey: nil}}, "--grey floor")
+      ""
+  """
+  @spec grey(Sim.Scene.t() | Lab.Trial.t(), option :: String.t()) :: String.t()
+  def grey(%{map: %{grey: shade}}, option) when shade != nil,
+    do: " (grey is wall; #{option} makes it floor)"
+
+  def grey(_scene, _option), do: ""
+
   @doc "A path, relative to a folder."
   @spec from(Path.t(), Path.t()) :: Path.t()
   def from(path, "."), do: path

@@ -1,20 +1,20 @@
 defmodule Console.Scenario.Report do
   @moduledoc "Writes what `mix scenario` prints about a run, as lines. Pure."
-  alias Console.Cli.Format
+  alias Console.Cli.{Format, MapName}
   alias Console.Fleet
   alias Lab.{Check, Scenario}
   alias Lab.Scenario.Text
 
   @doc "The first lines: the file, what it is for, and the robots."
-  @spec heading(Path.t(), Scenario.t(), %{:options => map(), optional(atom()) => term()}) ::
-          [String.t()]
-  def heading(file, scenario, %{options: options}) do
+  @spec heading(Path.t(), Scenario.t(), Lab.Trial.t()) :: [String.t()]
+  def heading(file, scenario, %{options: options} = trial) do
     robots = Format.count(length(options.robots), "robot")
     about = if scenario.about == "", do: "", else: ": " <> scenario.about
 
     [
       "#{file}#{about}",
-      "#{robots} (#{Fleet.describe(options.robots)}) in #{options.map}, seed #{options.seed}"
+      "#{robots} (#{Fleet.describe(options.robots)}) in #{options.map}" <>
+        MapName.grey(trial, "grey: :floor") <> ", seed #{options.seed}"
     ]
   end
 

@@ -59,6 +59,7 @@ defmodule Lab.Trial.Options do
          ~s(the name of a map, "FILE.yaml", "FILE.png:WIDTHxHEIGHT" or "FILE.pgm:WIDTHxHEIGHT")},
         default: "hall"
       ],
+      grey: [{:one_of, [:wall, :floor]}, default: :wall],
       start: [{:one_of, [:spread, :same]}, default: :spread],
       landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
       moves: [{:check, &moves?/1, "[{{x, y}, at_s}]"}, default: []],

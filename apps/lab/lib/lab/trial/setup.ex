@@ -26,7 +26,7 @@ defmodule Lab.Trial.Setup do
 
   @doc """
   A setup. Options (a keyword list or a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
-  `map`, `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
+  `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Lab.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Lab.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
@@ -64,7 +64,8 @@ defmodule Lab.Trial.Setup do
     asked = for {_x, _y} = place <- [landmark], do: place
     moves = for {place, _at_s} <- options.moves, do: place
 
-    with {:ok, map} <- at(["map"], Sim.Floorplan.open(options.map, length(options.robots))),
+    with {:ok, map} <-
+           at(["map"], Sim.Floorplan.open(options.map, length(options.robots), options.grey)),
          :ok <- at(["landmark"], check_landmarks(map, asked)),
          :ok <- at(["moves"], check_landmarks(map, moves)),
          :ok <- check_script(map, options),

@@ -7,6 +7,7 @@ defmodule Missions.Landmark.Blocker do
   | `:landmark` | the landmark, in the slot or on the way to it |
   | `{:robot, id}` | a robot, dead, standing or passing, in the slot or on the way |
   | `:unknown` | something that the sonars see, and that no robot has reported and no map shows |
+  | `:no_turn` | what is so near to its corners that its gate does not let it turn |
   | `:no_way` | none of these: known obstacles leave no way, or the robot finds none |
   | `:no_anchor` | the leader has not said where its place is |
   """

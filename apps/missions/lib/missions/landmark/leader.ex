@@ -174,7 +174,7 @@ defmodule Missions.Landmark.Leader do
   defp judge(mission) do
     good? =
       Landmark.State.sees?(mission) and Landmark.State.slow?(mission.percept, 0.05) and
-        Percept.astray(mission.percept) == nil and
+        Percept.astray(mission.percept) == nil and mission.leadership.shape.rung != nil and
         Enum.all?(mission.order, &in_place?(mission, &1))
 
     now = mission.now_ms

@@ -6,8 +6,10 @@ defmodule Missions.Landmark.Shape do
   # occupies are left out. When followers report that their slots are blocked, and all others stand
   # in theirs, the shape closes up step by step: spacing down to 0.8 m, then a column along the
   # leader's trail, then a cluster round it. When half of them are blocked, at least three, the cluster
-  # follows at once. In a cluster, places that a follower could not get to are left out of the next one. Once the
-  # leader has moved on, or a person asks for a shape, the requested shape is tried again.
+  # follows at once. In a cluster, a place that a follower could not get to is left out of the next ones for a while: what kept
+  # it from it, such as another robot, may be gone. If no other place is left, it tries again. Once the leader has moved on, or
+  # a person asks for a shape, the requested shape is tried again. Where there is no room for all, those for which there is none
+  # stand where they are: a place in a wall is none.
   #
   # A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
   # each time that followers cannot get in. While it drives, it keeps the requested shape where that fits, and is followed in a
@@ -17,6 +19,7 @@ defmodule Missions.Landmark.Shape do
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
   alias Missions.Landmark
   alias Missions.Landmark.{Claim, LandmarkTrack}
+  alias Missions.Landmark.Shape.Spots
 
   # How long followers have to take what they were given, places of a cluster longer.
   @step_ms 3_000
@@ -26,8 +29,11 @@ defmodule Missions.Landmark.Shape do
 
   # So many blocked followers, if they are half of all, show that the shape does not fit.
   @many 3
-  # What stands in a place of the cluster that a follower could not get to: its radius in metres.
+  # A follower that is faster (m/s) drives on.
+  @drives 0.05
+  # What stands in a place of the cluster that a follower could not get to: its radius in metres, and how long.
   @barred 0.05
+  @barred_ms 30_000
 
   # A leader that has moved this far (metres) chooses again when it stands, and one whose shape has not fitted for
   # this long while it drives, or that has found room for none.
@@ -50,8 +56,8 @@ defmodule Missions.Landmark.Shape do
 
   @typedoc """
   `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
-  slots of the formation; `barred` are places where a follower was blocked, `proven`
-  those where one has stood. The choice was made for `chosen`: the request, the number of followers, how often they could not
+  slots of the formation; `barred` are places where a follower was blocked, and when;
+  `proven` those where one has stood. The choice was made for `chosen`: the request, the number of followers, how often they could not
   get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
   """
   @type t :: %__MODULE__{
@@ -61,7 +67,7 @@ defmodule Missions.Landmark.Shape do
           squeeze: non_neg_integer(),
           rung: Ladder.rung() | nil,
           spots: [Pose.t()] | nil,
-          barred: [Pose.point()],
+          barred: [{Pose.point(), at_ms :: integer()}],
           proven: [Pose.t()],
           chosen: {Formation.t(), non_neg_integer(), non_neg_integer(), Pose.point()} | nil,
           fit_ms: integer() | nil
@@ -76,7 +82,7 @@ defmodule Missions.Landmark.Shape do
   """
   @spec update(t(), Landmark.State.t(), distance :: float()) :: t()
   def update(shape, mission, distance) do
-    shape = shape |> relax(mission) |> squeeze(mission)
+    shape = shape |> relax(mission) |> squeeze(mission) |> lapse(mission.now_ms)
 
     if mission.percept.grid != nil or shape.squeeze >= last(mission),
       do: fit(shape, mission, distance),
@@ -87,8 +93,8 @@ defmodule Missions.Landmark.Shape do
     %{percept: %{pose: pose}, now_ms: now} = mission
     slow? = Landmark.State.slow?(mission.percept, 0.02)
     asked = {mission.formation, length(mission.order), shape.squeeze}
-    here = %{pose: pose, distance: distance, trail: mission.trail}
-    bodies = bodies(mission) ++ for({x, y} <- shape.barred, do: {x, y, @barred})
+    here = %{pose: pose, distance: distance, trail: mission.trail, stand: stand(mission)}
+    bodies = bodies(mission) ++ for({{x, y}, _at_ms} <- shape.barred, do: {x, y, @barred})
     space = %Space{bodies: bodies, radius: radius(mission), grid: mission.percept.grid}
 
     case shape.chosen do
@@ -108,7 +114,7 @@ defmodule Missions.Landmark.Shape do
             shape
 
           slow? and (moved > @moved or not fits?) ->
-            choose(shape, asked, here, space, rungs(shape, mission), now)
+            choose(shape, asked, here, space, rungs(shape, mission), mission)
 
           slow? or moved <= @moved ->
             shape
@@ -120,7 +126,7 @@ defmodule Missions.Landmark.Shape do
             shape
 
           true ->
-            choose(shape, asked, here, space, @on_the_way, now)
+            choose(shape, asked, here, space, @on_the_way, mission)
         end
 
       {formation, followers, _steps, _at}
@@ -128,7 +134,7 @@ defmodule Missions.Landmark.Shape do
         refill(shape, asked, here, space, now)
 
       _none_or_for_another ->
-        choose(shape, asked, here, space, rungs(shape, mission), now)
+        choose(shape, asked, here, space, rungs(shape, mission), mission)
     end
   end
 
@@ -162,47 +168,60 @@ defmodule Missions.Landmark.Shape do
     %{shape | proven: more ++ proven}
   end
 
-  defp choose(shape, {asked, followers, _squeeze} = whom, here, space, rungs, now) do
+  defp choose(shape, {asked, followers, _squeeze} = whom, here, space, rungs, mission) do
     choice = Ladder.choose(rungs, asked, followers, here, space)
 
     cond do
-      choice != nil -> chosen(shape, choice, whom, here, now)
+      choice != nil ->
+        chosen(shape, choice, whom, here, mission.now_ms)
+
       # A leader on its way may find room again.
-      rungs == @on_the_way -> shape
+      rungs == @on_the_way ->
+        shape
+
+      shape.barred != [] ->
+        space = %{space | bodies: bodies(mission)}
+        choose(%{shape | barred: []}, whom, here, space, [:cluster], mission)
+
+      # Nor is there room now.
+      none?(shape, whom, here) ->
+        %{shape | fit_ms: mission.now_ms}
+
       # The request stays, so that the line that refuses it names it.
-      true -> chosen(shape, none(asked, followers), whom, here, now)
+      true ->
+        chosen(
+          shape,
+          %{
+            rung: nil,
+            formation: asked,
+            room: FreeSlots.whole(followers),
+            spots: Spots.most(asked, followers, here, space)
+          },
+          whom,
+          here,
+          mission.now_ms
+        )
     end
   end
 
   # Only a robot that could not get to its place gets another one.
-  defp refill(
-         %{spots: spots, barred: barred} = shape,
-         {asked, followers, _} = whom,
-         here,
-         space,
-         now
-       ) do
-    barred? = &(Pose.point(&1) in barred)
-    kept = for spot <- spots, not barred?.(spot), do: {spot.x, spot.y, space.radius}
-    left = followers - length(kept)
-    space = %{space | bodies: space.bodies ++ kept}
-
-    case Ladder.choose([:cluster], asked, left, here, space) do
-      nil ->
-        chosen(shape, none(asked, followers), whom, here, now)
-
-      choice ->
-        {spots, []} =
-          Enum.map_reduce(spots, choice.spots, fn spot, others ->
-            if barred?.(spot), do: {hd(others), tl(others)}, else: {spot, others}
-          end)
-
-        chosen(shape, %{choice | spots: spots, room: shape.room}, whom, here, now)
-    end
+  defp refill(%{spots: spots} = shape, {asked, _followers, _} = whom, here, space, now) do
+    barred = for {place, _at_ms} <- shape.barred, do: place
+    {left?, spots} = Spots.refill(spots, barred, asked, here, space)
+    choice = %{rung: :cluster, formation: asked, room: shape.room, spots: spots}
+    chosen(if(left?, do: shape, else: %{shape | barred: []}), choice, whom, here, now)
   end
 
-  defp none(asked, followers),
-    do: %{rung: nil, formation: asked, room: FreeSlots.whole(followers), spots: nil}
+  defp none?(%{rung: nil, chosen: {asked, followers, _, at}}, {asked, followers, _}, here),
+    do: Pose.distance(at, here.pose) <= @moved
+
+  defp none?(_shape, _whom, _here), do: false
+
+  # Where the followers stand, in metres, as far as they are heard.
+  defp stand(mission) do
+    beats = Landmark.State.beats(mission)
+    for id <- mission.order, %{pose: {x, y, _heading}} <- [beats[id]], do: {x / 1000, y / 1000}
+  end
 
   defp chosen(shape, choice, {asked, followers, squeeze}, here, now) do
     %{
@@ -329,25 +348,33 @@ defmodule Missions.Landmark.Shape do
     end
   end
 
-  # What the followers that are heard claim, each with its number in the order.
+  # What the followers that are heard claim, each with its number in the order. One that drives on, as on a long way that it
+  # drives slowly because it is unsure of its place, is not kept from it yet.
   defp followers(mission) do
     beats = Landmark.State.beats(mission)
 
-    for {id, index} <- Enum.with_index(mission.order),
-        beat = beats[id],
-        do: {index, Claim.of(beat)}
+    for {id, index} <- Enum.with_index(mission.order), beat = beats[id] do
+      claim = Claim.of(beat)
+      {index, %{claim | blocked: claim.blocked and not drives?(mission.percept.peers[id])}}
+    end
   end
+
+  defp drives?(%{twist: %{linear: linear}}), do: abs(linear) > @drives
+  defp drives?(_unheard), do: false
 
   defp bar(%{rung: :cluster, spots: [_ | _] = spots} = shape, mission) do
     blocked =
       for {index, %{blocked: true}} <- followers(mission),
           spot = Enum.at(spots, index),
-          do: Pose.point(spot)
+          do: {Pose.point(spot), mission.now_ms}
 
     %{shape | barred: blocked ++ shape.barred}
   end
 
   defp bar(shape, _mission), do: shape
+
+  defp lapse(%{barred: barred} = shape, now),
+    do: %{shape | barred: Enum.filter(barred, fn {_place, at_ms} -> now - at_ms < @barred_ms end)}
 
   defp formation(asked, 0), do: {asked, false}
 

@@ -82,6 +82,39 @@ defmodule Missions.Landmark.ShapeTest do
     assert length(again.barred) == 2
   end
 
+  test "a place that a robot could not get to is free again after half a minute" do
+    shape = run([claims(@ids), claims([:mag3]) |> rest()])
+    later = &Shape.update(shape, mission(claims([]) |> rest(), 18_000 + &1), 1.6)
+    assert [_place] = later.(29_900).barred
+    assert later.(30_000).barred == []
+    assert later.(30_000).spots == shape.spots
+  end
+
+  test "where there is no room for all, no place is in a wall, and nothing is formed" do
+    # A room of 4 x 1.2 m about the leader; its followers are in it, close together.
+    row = fn j -> if j in 94..105, do: 60..99, else: 0..-1//1 end
+
+    cells = for j <- 0..199, i <- 0..199, into: <<>>, do: if(i in row.(j), do: <<0>>, else: <<1>>)
+
+    grid = Grid.new(cells, {200, 200}, 0.1, {-8.0, -10.0})
+    stand = %{mag2: -1.0, mag3: -0.7, mag4: 0.5, mag5: 0.8}
+
+    mission =
+      Enum.reduce(stand, mission(claims([]), 9_000), fn {id, x}, mission ->
+        put_in(mission.percept.peers[id].beat.pose, {round(1_000 * x), 0, 0})
+      end)
+
+    shape = Shape.update(Shape.new(), put_in(mission.percept.grid, grid), 1.6)
+    assert %{rung: nil, spots: [_, _, _, _]} = shape
+    assert Enum.uniq(shape.spots) == shape.spots
+    for spot <- shape.spots, do: assert(Grid.free?(grid, Pose.point(spot), 0.2))
+
+    # They stay as long as there is no room, wherever the robots are by then.
+    later = put_in(%{mission | now_ms: 11_000}.percept.grid, grid)
+    later = put_in(later.percept.peers[:mag5].beat.pose, {-1_500, 0, 0})
+    assert Shape.update(shape, later, 1.6).spots == shape.spots
+  end
+
   test "a place in which a robot has stood is kept, whatever sonars see there later" do
     shape = run([claims(@ids)])
     there = claims([]) |> rest() |> mission(10_000)

@@ -2,10 +2,8 @@ defmodule Nav.MapFile.Picture do
   @moduledoc """
   Describes what a picture shows of walls, and the cells they fill. Pure.
 
-  Pixels darker than half are wall. A picture of the three shades that map_server writes, 0 for
-  wall, 205 for unknown and 254 for floor, and of no other, is read as it means them: what is
-  unknown is wall, too. Specks are no walls: dark pixels that touch no others, and lie within 3 x 3
-  pixels and 0.15 x 0.15 m.
+  Pixels darker than half are wall, and so is the grey of what is unknown (`unknown/1`) with all that is darker. Specks are
+  no walls: dark pixels that touch no others, and lie within 3 x 3 pixels and 0.15 x 0.15 m.
   """
   alias Nav.MapFile.Runs
 
@@ -15,6 +13,12 @@ defmodule Nav.MapFile.Picture do
   @cell 0.05
   @speck_pixels 3
   @speck_m 0.15
+
+  # A light shade of at least this share of all pixels is an area, and no edge between two others; of so many pixels the share
+  # is taken. Shades of one area differ by less than this.
+  @share 0.05
+  @sample 1_000_000
+  @alike 10
 
   # A row takes its time however short it is.
   @most_side 20_000
@@ -36,12 +40,49 @@ defmodule Nav.MapFile.Picture do
     end
   end
 
-  @doc "Which shades are wall in a picture without a description."
-  @spec shades(t()) :: Runs.marks()
-  def shades({_width, _height, rows}) do
-    seen = Enum.reduce_while(rows, {false, false}, &three_shades/2)
-    Runs.marks(&(&1 < 128 or (seen == {true, true} and &1 == 205)))
+  @doc """
+  The grey that stands for what is unknown in a picture without a description, `nil` if there is none.
+
+  It is 205 in a picture of exactly the three shades that map_server writes, 0 for wall, 205 for unknown and 254 for floor.
+  In any other it is a light grey of at least 5 % of all pixels, if a lighter shade, that of floor, has as many, and no third
+  light one.
+
+      iex> plan = fn grey -> {10, 2, [<<0, 0, 255, 255, 255, 255, 255, 255, grey, grey>>, <<255::80>>]} end
+      iex> for grey <- [178, 230, 250, 100], do: Nav.MapFile.Picture.unknown(plan.(grey))
+      [178, 230, nil, nil]
+  """
+  @spec unknown(t()) :: byte() | nil
+  def unknown({_width, _height, rows} = picture) do
+    if Enum.reduce_while(rows, {false, false}, &three_shades/2) == {true, true},
+      do: 205,
+      else: picture |> light_areas() |> third()
   end
+
+  # Of floor, the lightest, and one other.
+  defp third([]), do: nil
+
+  defp third([floor | others]) do
+    case Enum.drop_while(others, &(&1 > floor - @alike)) do
+      [grey | darker] -> if Enum.all?(darker, &(&1 > grey - @alike)), do: grey
+      [] -> nil
+    end
+  end
+
+  # The lightest first.
+  defp light_areas({width, height, rows}) do
+    pixels =
+      rows
+      |> Enum.take_every(max(div(width * height, @sample), 1))
+      |> Enum.flat_map(&:binary.bin_to_list/1)
+
+    least = @share * length(pixels)
+    areas = for {shade, n} <- Enum.frequencies(pixels), shade >= 128 and n >= least, do: shade
+    Enum.sort(areas, :desc)
+  end
+
+  @doc "Which shades are wall in a picture without a description, given the grey of what is unknown in it."
+  @spec shades(unknown :: byte() | nil) :: Runs.marks()
+  def shades(unknown), do: Runs.marks(&(&1 < 128 or (unknown != nil and &1 <= unknown)))
 
   # Whether 205 and 254 were seen, as long as there is no other shade than these and 0.
   defp three_shades(row, {unknown?, floor?}) do
@@ -64,7 +105,7 @@ defmodule Nav.MapFile.Picture do
   any of its pixels is, so that thin walls have no gaps.
 
       iex> picture = {3, 2, [<<0, 0, 0>>, <<255, 255, 0>>]}
-      iex> marks = Nav.MapFile.Picture.shades(picture)
+      iex> marks = Nav.MapFile.Picture.shades(nil)
       iex> Nav.MapFile.Picture.walls(picture, marks, {0.6, 0.4}) |> Enum.map(&binary_part(&1, 0, 12))
       [<<0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1>>, <<0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1>>,
        <<0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1>>, <<0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1>>,

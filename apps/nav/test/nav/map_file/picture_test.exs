@@ -7,7 +7,7 @@ defmodule Nav.MapFile.PictureTest do
   defp picture(rows), do: {byte_size(hd(rows)), length(rows), rows}
 
   defp walls(picture, size) do
-    rows = Picture.walls(picture, Picture.shades(picture), size)
+    rows = Picture.walls(picture, Picture.shades(nil), size)
     for row <- Enum.reverse(rows), do: for(<<wall <- row>>, do: wall == 1)
   end
 
@@ -68,16 +68,45 @@ defmodule Nav.MapFile.PictureTest do
   end
 
   test "dark is wall; three shades are read as map_server means them" do
-    wall? = fn rows, grey -> rows |> picture() |> Picture.shades() |> elem(grey) end
-
     for {rows, walls, floor} <- [
-          {[<<0, 205, 254>>], [0, 127, 205], [128, 254, 255]},
-          {[<<0, 205, 254, 255>>], [0, 127], [128, 205, 255]},
-          {[<<0, 205>>], [0], [205]},
-          {[<<90, 127, 128, 200>>], [90, 127], [128, 200]}
+          {[<<0, 205, 254>>], [0, 127, 205], [206, 254, 255]},
+          {[<<0, 205, 254>> <> :binary.copy(<<254>>, 97)], [0, 127, 205], [206, 254, 255]},
+          {[<<0, 205>>], [0, 127], [128, 205]},
+          {[<<90, 127, 200, 200>>], [90, 127], [128, 200]}
         ] do
-      for grey <- walls, do: assert(wall?.(rows, grey), "#{grey} of #{inspect(rows)}")
-      for grey <- floor, do: refute(wall?.(rows, grey), "#{grey} of #{inspect(rows)}")
+      for grey <- walls, do: assert(wall?(rows, grey), "#{grey} of #{inspect(rows)}")
+      for grey <- floor, do: refute(wall?(rows, grey), "#{grey} of #{inspect(rows)}")
     end
+  end
+
+  defp wall?(rows, grey),
+    do: rows |> picture() |> Picture.unknown() |> Picture.shades() |> elem(grey)
+
+  test "one light grey beside floor and wall is what is unknown, if there is enough of it" do
+    # So many pixels of each shade, of a hundred.
+    rows = fn shades ->
+      [for({shade, n} <- shades, into: <<>>, do: :binary.copy(<<shade>>, n))]
+    end
+
+    for grey <- [150, 178, 204, 205, 230] do
+      plan = rows.([{0, 10}, {grey, 30}, {255, 60}])
+      for dark <- [0, 127, 128, grey], do: assert(wall?(plan, dark))
+      for light <- [grey + 1, 255], do: refute(wall?(plan, light))
+    end
+
+    for {shades, why} <- [
+          {[{0, 10}, {178, 4}, {255, 86}], "an edge between black and white"},
+          {[{0, 10}, {178, 90}], "floor that is drawn grey"},
+          {[{0, 10}, {178, 86}, {255, 4}], "the same with words in white"},
+          {[{0, 10}, {178, 30}, {220, 30}, {255, 30}], "rooms in several shades"},
+          {[{0, 10}, {248, 30}, {255, 60}], "paper that is not quite white"},
+          {[{0, 10}, {100, 30}, {255, 60}], "walls in grey"}
+        ],
+        do: refute(wall?(rows.(shades), 178), why)
+  end
+
+  test "of a large picture a part of its rows tells" do
+    row = :binary.copy(<<204>>, 800) <> :binary.copy(<<255>>, 1_200)
+    assert Picture.unknown({2_000, 2_000, List.duplicate(row, 2_000)}) == 204
   end
 end

@@ -7,7 +7,7 @@ defmodule Robot.Behaviour.Avoid do
   right of oncoming ones, and away from bodies that are very close (`.Preference`). All wishes are
   slowed down near other robots (`.Brake`); one without a velocity is changed in no other way. A
   robot that makes no progress for some seconds leaves its route for a while (`.Progress`), and a
-  robot that stands in another's way makes room (`.GiveWay`). If a body that will not move is in
+  robot that stands in another's way makes room (`.GiveWay`), and one that cannot turn backs out (`.BackOut`). If a body that will not move is in
   the goal, the robot goes to the nearest place beside it, stands there, and its wish has
   `by: :blocked`. If nothing is near, a wish within the profile's speed passes unchanged.
 
@@ -22,6 +22,7 @@ defmodule Robot.Behaviour.Avoid do
   alias Robot.Behaviour.Avoid
 
   alias Robot.Behaviour.Avoid.{
+    BackOut,
     Brake,
     Caution,
     Clearance,
@@ -60,6 +61,7 @@ defmodule Robot.Behaviour.Avoid do
       velocity: nil,
       yield: nil,
       right: %RightOfWay{},
+      out: %BackOut{},
       slow?: false,
       echoes: if(unmapped?, do: %Echoes{})
     }
@@ -104,7 +106,22 @@ defmodule Robot.Behaviour.Avoid do
     {brake(wish, wish.twist, percept, robots), state}
   end
 
-  defp safe(%Wish{velocity: {vx, vy}} = wish, percept, state) do
+  defp safe(wish, percept, state) do
+    case BackOut.note(state.out, percept) do
+      {nil, out} -> steer(wish, percept, %{state | out: out})
+      {linear, out} -> back_out(wish, linear, percept, %{state | out: out})
+    end
+  end
+
+  defp back_out(wish, linear, percept, state) do
+    robots = percept |> Neighbours.robots() |> Neighbours.near()
+    wish = %{wish | by: :back_out, goal: nil, reverse?: true, velocity: nil}
+
+    {brake(wish, Twist.new(linear, 0), percept, robots),
+     %{state | progress: nil, velocity: nil, way: nil}}
+  end
+
+  defp steer(%Wish{velocity: {vx, vy}} = wish, percept, state) do
     speed = :math.sqrt(vx * vx + vy * vy)
 
     if speed < 0.02 or GiveWay.now?(state.yield, percept.at_ms),

@@ -6,12 +6,13 @@ defmodule Robot.Behaviour.Blocker do
   |---|---|
   | `{:robot, id}` | a robot, dead, standing or passing, in the place or on the way |
   | `:unknown` | something that the sonars see, and that neither a robot has reported nor the map shows |
+  | `:no_turn` | what is so near to its corners that its gate does not let it turn |
   | `:no_way` | none of these: known obstacles leave no way, or the robot finds none |
 
   Missions add marks of their own.
   """
   alias Hal.Pose
-  alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Behaviour.Avoid.{BackOut, Neighbours}
   alias Robot.Percept
 
   # The room that a robot needs beside its body, and the length of its way that is checked, in
@@ -21,16 +22,19 @@ defmodule Robot.Behaviour.Blocker do
   # An echo so near to a wall of the map (metres) is the wall's.
   @wall 0.15
 
-  @type t :: {:robot, atom()} | :unknown | :no_way
+  @type t :: {:robot, atom()} | :unknown | :no_turn | :no_way
   @typedoc "A thing, its place and its radius in metres."
   @type mark :: {what :: term(), Pose.point(), radius :: float()}
 
   @doc """
   The blocker between a percept's pose and a place, both in the map frame in metres, or the mark that is it. A blocker in the
-  place comes first, then the nearest one on the first 1.5 m of the straight way.
+  place comes first, then the nearest one on the first 1.5 m of the straight way; but one that may not turn gets nowhere.
   """
   @spec find(Percept.t(), Pose.point(), [mark()]) :: t() | term()
-  def find(%Percept{pose: pose, profile: profile} = percept, place, marks \\ []) do
+  def find(percept, place, marks \\ []),
+    do: if(BackOut.refused?(percept), do: :no_turn, else: near(percept, place, marks))
+
+  defp near(%Percept{pose: pose, profile: profile} = percept, place, marks) do
     things = things(percept, marks)
     room = profile.radius + @clear
     end_of_look = ahead(pose, place)
@@ -48,6 +52,7 @@ defmodule Robot.Behaviour.Blocker do
   @spec words(t() | nil) :: String.t() | nil
   def words(nil), do: nil
   def words({:robot, id}), do: Atom.to_string(id)
+  def words(:no_turn), do: "no room to turn"
   def words(:unknown), do: "something unknown"
   def words(:no_way), do: "no way"
 

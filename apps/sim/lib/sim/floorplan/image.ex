@@ -11,13 +11,16 @@ defmodule Sim.Floorplan.Image do
   # Metres: what a picture may have, with as much beside it.
   @widest 2000.0
 
-  @doc "The fields of the map of this name; the error is one line."
-  @spec open(String.t()) :: {:ok, map()} | {:error, String.t()}
-  def open(name) do
+  @doc """
+  The fields of the map of this name; the error is one line. `grey` says what the grey of a picture without a description is
+  that seems to stand for what is unknown.
+  """
+  @spec open(String.t(), Sim.Floorplan.grey()) :: {:ok, map()} | {:error, String.t()}
+  def open(name, grey) do
     cond do
       String.starts_with?(name, "rooms:") -> unknown(name)
       name =~ ~r/\.ya?ml\z/i -> described(name)
-      match = Regex.run(~r/\A(.+):([^:]*)\z/s, name) -> sized(name, match)
+      match = Regex.run(~r/\A(.+):([^:]*)\z/s, name) -> sized(name, match, grey)
       true -> unknown(name)
     end
   end
@@ -27,12 +30,14 @@ defmodule Sim.Floorplan.Image do
     {:error, "map: expected #{String.trim_trailing(allowed, ",")}, got #{name}#{hint}"}
   end
 
-  defp sized(name, [_, file, size]) do
+  defp sized(name, [_, file, size], grey) do
     with {:ok, {width, height} = size} <- size(size, "map #{name}"),
          :ok <- few("map #{name}", size),
          {:ok, picture} <- picture(file) do
-      walls = Picture.walls(picture, Picture.shades(picture), size)
-      plan(name, walls, size, {-width / 2, -height / 2})
+      unknown = if grey == :wall, do: Picture.unknown(picture)
+      walls = Picture.walls(picture, Picture.shades(unknown), size)
+      {:ok, fields} = plan(name, walls, size, {-width / 2, -height / 2})
+      {:ok, Map.put(fields, :grey, unknown)}
     end
   end
 

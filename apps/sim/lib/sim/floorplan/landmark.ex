@@ -4,6 +4,10 @@ defmodule Sim.Floorplan.Landmark do
 
   @radius 0.15
 
+  @doc "Its radius in metres."
+  @spec radius() :: float()
+  def radius, do: @radius
+
   @doc "See `Sim.Floorplan.check_landmark/2`."
   @spec check(Sim.Floorplan.t(), Sim.Floorplan.point()) :: :ok | {:error, String.t()}
   def check(map, {x, y}) do

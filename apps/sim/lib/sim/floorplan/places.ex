@@ -2,11 +2,11 @@ defmodule Sim.Floorplan.Places do
   @moduledoc """
   Chooses where the landmark and the robots of a run stand, if that is not given. Pure.
 
-  The landmark stands in the middle of the map, if the fleet has room about it. If not, in the room
+  The landmark stands in the middle of the map, if the fleet has room about it, and in a drawing gets past it. If not, in the room
   nearest the middle that takes the whole fleet; else where the fleet has room in several rooms, by
   ways of 0.8 m that lead to the landmark; else by ways that are just as wide as the robot. What
   lies outside of a building comes last: all this is tried with the rooms that do not reach the edge
-  of the picture, then with those that do.
+  of the picture, then with those that do. A landmark that is given outside of a building which takes the fleet is refused.
   """
   alias Hal.Pose
   alias Sim.Floorplan
@@ -21,13 +21,31 @@ defmodule Sim.Floorplan.Places do
         ) ::
           {:ok, Floorplan.point() | nil, [Pose.t()]} | {:error, String.t()}
   def choose(map, robots, seed, asked) do
-    fleet = %{map: map, robots: robots, seed: seed, asked: asked}
+    fleet = %{map: map, robots: robots, seed: seed, asked: asked, past?: false}
 
-    case fleet |> attempts() |> first(0) do
-      {:full, most} -> {:error, line(map, robots, asked, most)}
-      {:ok, landmark, poses} -> {:ok, landmark, poses}
+    case if(astray?(fleet), do: :outside, else: fleet |> past() |> first(0)) do
+      :outside ->
+        {x, y} = asked
+
+        {:error,
+         "the landmark cannot stand at #{x},#{y}: that is outside of the building in map #{map.name}"}
+
+      {:full, most} ->
+        {:error, line(map, robots, asked, most)}
+
+      {:ok, landmark, poses} ->
+        {:ok, landmark, poses}
     end
   end
+
+  # On a drawing, first places of the landmark that leave ways past it.
+  defp past(%{map: map, asked: :default} = fleet) do
+    if Maps.built_in?(map.name),
+      do: attempts(fleet),
+      else: attempts(%{fleet | past?: true}) ++ attempts(fleet)
+  end
+
+  defp past(fleet), do: attempts(fleet)
 
   # Each is tried when those before it have failed; the most robots that one had room for counts.
   defp first([], most), do: {:full, most}
@@ -56,30 +74,47 @@ defmodule Sim.Floorplan.Places do
 
     cond do
       # Without a margin, and made to be used whole.
-      Maps.built_in?(map.name) -> [middle | in_rooms(fleet, fn _room -> true end)]
-      outside?(fleet) -> inside ++ [middle] ++ outside
-      true -> [middle] ++ inside ++ outside
+      Maps.built_in?(map.name) ->
+        [middle | in_rooms(fleet, fn _room -> true end)]
+
+      outside?(fleet, Cells.cell(map, Cells.middle(map.room)), :outer?) ->
+        inside ++ [middle] ++ outside
+
+      true ->
+        [middle] ++ inside ++ outside
     end
   end
 
   defp in_rooms(fleet, which?),
     do: for(level <- Search.levels(fleet), do: fn -> Search.in_rooms(fleet, level, which?) end)
 
-  # Whether the middle of the picture is outside of a building that is in it.
-  defp outside?(%{map: map} = fleet) do
+  # Whether a landmark that is given is in what surrounds a building that would take the fleet.
+  defp astray?(%{map: map, asked: {_x, _y} = place} = fleet) do
+    [_one_room, level | _] = Search.levels(fleet)
+
+    not Maps.built_in?(map.name) and outside?(fleet, Search.beside(map, level, place), :around?) and
+      match?({:ok, _, _}, fleet |> in_rooms(&(not &1.outer?)) |> first(0))
+  end
+
+  defp astray?(_chosen), do: false
+
+  # Whether a cell is outside of a building that is in the picture: in a room of this kind.
+  defp outside?(%{map: map} = fleet, cell, kind) do
     [{_way, start} | _] = Search.levels(fleet)
-    middle = Cells.cell(map, Cells.middle(map.room))
     {outside, inside} = map |> Rooms.of(start) |> Enum.split_with(& &1.outer?)
-    inside != [] and Enum.any?(outside, &Rooms.in?(map, &1, middle))
+
+    cell != nil and inside != [] and
+      Enum.any?(outside, &(Map.fetch!(&1, kind) and Rooms.in?(map, &1, cell)))
   end
 
   # As on the maps that are made for a fleet: with straight ways to the landmark.
-  defp middle(%{map: map, robots: robots, seed: seed}, place) do
+  defp middle(%{map: map, robots: robots, seed: seed} = fleet, place) do
     with :ok <- if(place, do: Landmark.check(map, place), else: :ok),
-         {:ok, poses} <- Starts.spread(map, robots, seed, place) do
+         {:ok, poses} <- Starts.spread(map, robots, seed, place),
+         true <- not fleet.past? or Search.past?(fleet, place, poses) do
       {:ok, place, poses}
     else
-      {:error, _line} -> {:full, 0}
+      _wall_or_no_way -> {:full, 0}
     end
   end
 

@@ -11,8 +11,8 @@ defmodule Sim.Floorplan.Rooms do
   @space 1.5
   @worth 4.0
 
-  @typedoc "`outer?`: it reaches the edge of the plan, as what surrounds a building does."
-  @type t :: %{area: Runs.area(), outer?: boolean(), away: float()}
+  @typedoc "`outer?`: it reaches the edge of the plan, as what surrounds a building does; `around?`: all four edges."
+  @type t :: %{area: Runs.area(), outer?: boolean(), around?: boolean(), away: float()}
 
   @doc """
   The least byte of a map's field at a place whose centre is so far from all walls, in metres.
@@ -40,8 +40,14 @@ defmodule Sim.Floorplan.Rooms do
 
     rooms =
       for %{columns: {a, b}, rows: {c, d}} = area <- Runs.areas(rows, :sides) do
-        outer? = a <= left or b >= right or c <= low or d >= high
-        %{area: area, outer?: outer?, away: away(map, area)}
+        reached = [a <= left, b >= right, c <= low, d >= high]
+
+        %{
+          area: area,
+          outer?: Enum.any?(reached),
+          around?: Enum.all?(reached),
+          away: away(map, area)
+        }
       end
 
     Enum.sort_by(rooms, &{&1.outer?, &1.away, &1.area.runs})

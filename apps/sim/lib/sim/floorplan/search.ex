@@ -4,7 +4,7 @@ defmodule Sim.Floorplan.Search do
   # them. Pure.
   alias Hal.Pose
   alias Sim.Floorplan
-  alias Sim.Floorplan.{Clearance, Cells, Packing, Rooms}
+  alias Sim.Floorplan.{Clearance, Cells, Landmark, Packing, Rooms}
 
   # Metres. Half the width of a way, and the distance of a start place from walls: as a rule, and
   # beyond a robot's radius where there is no more room.
@@ -17,12 +17,16 @@ defmodule Sim.Floorplan.Search do
   # So many cells to start on are first looked at, for each robot: 4 m2.
   @cells 1600
 
-  @typedoc "`asked` is a landmark's place, `:default` for one to be chosen, or `nil` for none."
+  @typedoc """
+  `asked` is a landmark's place, `:default` for one to be chosen, or `nil` for none; `past?`: one that is chosen must leave ways
+  past it.
+  """
   @type fleet :: %{
           map: Floorplan.t(),
           robots: [{atom(), radius :: float()}],
           seed: integer(),
-          asked: Floorplan.point() | :default | nil
+          asked: Floorplan.point() | :default | nil,
+          past?: boolean()
         }
 
   @typedoc "The least bytes of the field on ways and on places to start."
@@ -84,7 +88,9 @@ defmodule Sim.Floorplan.Search do
 
     case around(fleet, level, cell, landmark) do
       {:ok, poses} ->
-        {:ok, landmark, poses}
+        if not fleet.past? or past?(fleet, landmark, poses),
+          do: {:ok, landmark, poses},
+          else: in_room(fleet, level, cells, {passed, most})
 
       {:full, fit, area} ->
         in_room(fleet, level, cells, {MapSet.union(passed, area), max(most, fit)})
@@ -104,18 +110,52 @@ defmodule Sim.Floorplan.Search do
   """
   @spec about(fleet(), level(), Floorplan.point()) :: found()
   def about(%{map: map} = fleet, {way, _start} = level, place) do
-    low = min(way, Clearance.steps(map, place))
-    near? = fn cell -> Pose.distance(Cells.point(map, cell), place) <= @beside end
-
-    with true <- low > 0,
-         {_which, cells, _passed} = reach(map, Cells.cell(map, place), low, way, 1),
-         cell when is_integer(cell) <- Enum.find(cells, near?),
+    with cell when is_integer(cell) <- beside(map, {way, way}, place),
          {:ok, poses} <- around(fleet, level, cell, place) do
       {:ok, place, poses}
     else
       {:full, fit, _passed} -> {:full, fit}
-      _none -> {:full, 0}
+      nil -> {:full, 0}
     end
+  end
+
+  @doc "The first cell, 3 m away at most, whose byte is at least `good`, by ways that are as wide as asked, or as the place."
+  @spec beside(Floorplan.t(), {way :: pos_integer(), good :: pos_integer()}, Floorplan.point()) ::
+          (cell :: non_neg_integer()) | nil
+  def beside(map, {way, good}, place) do
+    low = min(way, Clearance.steps(map, place))
+    near? = fn cell -> Pose.distance(Cells.point(map, cell), place) <= @beside end
+
+    if low > 0 do
+      {_which, cells, _passed} = reach(map, Cells.cell(map, place), low, good, 1)
+      Enum.find(cells, near?)
+    end
+  end
+
+  @doc """
+  Whether the robots get past a landmark to each other, by ways as wide as the widest of them: one in the middle of a corridor
+  may leave none.
+  """
+  @spec past?(fleet(), Floorplan.point(), [Pose.t()]) :: boolean()
+  def past?(%{map: map, robots: robots} = fleet, landmark, [first | others]) do
+    [_one_room, _doors, {way, _start}] = levels(fleet)
+    off = Landmark.radius() + (robots |> Enum.map(&elem(&1, 1)) |> Enum.max()) + @tight_way
+    from = Cells.cell(map, Pose.point(first))
+    {:all, _none, passed} = wave(map, [from], around(map, landmark, off), way, 256, {1, 0, []})
+    Enum.all?(others, &MapSet.member?(passed, Cells.cell(map, Pose.point(&1))))
+  end
+
+  # The cells that are nearer to a place than this (metres).
+  defp around(map, {x, y} = place, off) do
+    steps = ceil(off / map.cell)
+
+    for i <- -steps..steps,
+        j <- -steps..steps,
+        at = {x + i * map.cell, y + j * map.cell},
+        cell = Cells.cell(map, at),
+        Pose.distance(Cells.point(map, cell), place) < off,
+        into: MapSet.new(),
+        do: cell
   end
 
   # On places reached from a cell; more of them if the nearest do not suffice.

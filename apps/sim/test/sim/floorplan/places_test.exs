@@ -21,7 +21,7 @@ defmodule Sim.Floorplan.PlacesTest do
 
     file = Path.join(dir, "map.pgm")
     File.write!(file, ["P5 #{w} #{h} 255\n", pixels])
-    {:ok, map} = Floorplan.open("#{file}:#{width}x#{height}", 1)
+    {:ok, map} = Floorplan.open("#{file}:#{width}x#{height}", 1, options[:grey] || :wall)
     map
   end
 
@@ -35,7 +35,8 @@ defmodule Sim.Floorplan.PlacesTest do
   # Whether a disc comes from everywhere to everywhere among these places, on a grid of 10 cm.
   defp connected?(map, [from | places], radius) do
     node = fn {x, y} -> {round(x * 10), round(y * 10)} end
-    reached = spread(map, [node.(from)], MapSet.new([node.(from)]), radius)
+    free? = &Floorplan.free?(map, &1, radius)
+    reached = spread([node.(from)], MapSet.new([node.(from)]), free?)
 
     Enum.all?(places, fn place ->
       {i, j} = node.(place)
@@ -43,17 +44,17 @@ defmodule Sim.Floorplan.PlacesTest do
     end)
   end
 
-  defp spread(_map, [], reached, _radius), do: reached
+  defp spread([], reached, _free?), do: reached
 
-  defp spread(map, [{i, j} | rest], reached, radius) do
+  defp spread([{i, j} | rest], reached, free?) do
     new =
       for {a, b} <- [{1, 0}, {-1, 0}, {0, 1}, {0, -1}],
           node = {i + a, j + b},
           not MapSet.member?(reached, node),
-          Floorplan.free?(map, {(i + a) / 10, (j + b) / 10}, radius),
+          free?.({(i + a) / 10, (j + b) / 10}),
           do: node
 
-    spread(map, new ++ rest, MapSet.union(reached, MapSet.new(new)), radius)
+    spread(new ++ rest, MapSet.union(reached, MapSet.new(new)), free?)
   end
 
   defp check(map, landmark, poses, options \\ []) do
@@ -184,6 +185,110 @@ defmodule Sim.Floorplan.PlacesTest do
     {:ok, {_x, y} = landmark, poses} = choose(map, 8)
     assert y > 0.5
     check(map, landmark, poses)
+  end
+
+  test "a landmark in a corridor leaves ways past it from robot to robot", %{tmp_dir: dir} do
+    # A corridor of 1.6 m between rooms of 3.6 x 3.4 m, each with a door of 1 m to it.
+    wall? = fn x, y ->
+      beside = x - 4 * Float.round(x / 4)
+
+      abs(y) > 4.4 or abs(x) > 7.9 or
+        (abs(y) > 0.8 and abs(y) < 0.95 and abs(abs(beside) - 2.0) > 0.5) or
+        (abs(y) > 0.8 and abs(beside) < 0.08)
+    end
+
+    map = map(dir, {16, 9}, wall?)
+
+    for seed <- 1..6 do
+      {:ok, {lx, ly} = landmark, [first | others]} = choose(map, 5, seed)
+      check(map, landmark, [first | others], from_wall: 0.39)
+      free? = &(Floorplan.free?(map, &1, 0.3) and Pose.distance(&1, {lx, ly}) > 0.45)
+      node = fn pose -> {round(pose.x * 10), round(pose.y * 10)} end
+      reached = spread([node.(first)], MapSet.new([node.(first)]), free?)
+
+      for pose <- others do
+        {i, j} = node.(pose)
+        near = for a <- -1..1, b <- -1..1, do: {i + a, j + b}
+        assert Enum.any?(near, &MapSet.member?(reached, &1)), "seed #{seed}"
+      end
+    end
+  end
+
+  test "the grey of a drawing is wall, unless it is said to be floor", %{tmp_dir: dir} do
+    # A building in a grey margin, about a grey court in its middle.
+    shade = fn x, y ->
+      cond do
+        box?(x, y, {-3.0, -2.0, 3.0, 2.0}) -> 178
+        box?(x, y, {-3.1, -2.1, 3.1, 2.1}) -> 0
+        box?(x, y, {-7.0, -5.0, 7.0, 5.0}) -> 255
+        box?(x, y, {-7.1, -5.1, 7.1, 5.1}) -> 0
+        true -> 178
+      end
+    end
+
+    for seed <- 1..3 do
+      map = map(dir, {18, 14}, shade)
+      assert map.grey == 178
+      {:ok, {x, y} = landmark, poses} = choose(map, 5, seed)
+      refute box?(x, y, {-3.1, -2.1, 3.1, 2.1})
+      assert box?(x, y, {-7.0, -5.0, 7.0, 5.0})
+      check(map, landmark, poses)
+      assert {:error, line} = Floorplan.check_landmark(map, {0.0, 0.0})
+      assert line =~ ~r/there is a wall$/
+    end
+
+    map = map(dir, {18, 14}, shade, grey: :floor)
+    assert map.grey == nil
+    assert {:ok, place, _poses} = choose(map, 5)
+    assert place == {0.0, 0.0}
+  end
+
+  test "a landmark outside of a building that takes the fleet is refused", %{tmp_dir: dir} do
+    wall? = fn x, y, door? ->
+      box?(x, y, {-5.1, -4.1, 5.1, 4.1}) and not box?(x, y, {-5.0, -4.0, 5.0, 4.0}) and
+        not (door? and y > 0 and abs(x) < 0.5)
+    end
+
+    for {door?, {x, y} = place} <- [
+          {false, {7.0, 0.0}},
+          {true, {0.0, 5.2}},
+          {true, {5.4, 2.0}}
+        ] do
+      map = map(dir, {18, 14}, &wall?.(&1, &2, door?))
+      {:error, line} = choose(map, 5, 1, place)
+
+      assert line ==
+               "the landmark cannot stand at #{x},#{y}: that is outside of the building in map #{map.name}"
+
+      assert {:ok, {3.0, 0.0}, _poses} = choose(map, 5, 1, {3.0, 0.0})
+    end
+
+    # No building for so many.
+    map =
+      map(
+        dir,
+        {10, 8},
+        &(box?(&1, &2, {-2.1, -2.1, 2.1, 2.1}) and not box?(&1, &2, {-2.0, -2.0, 2.0, 2.0}))
+      )
+
+    assert {:ok, {4.0, 0.0}, _poses} = choose(map, 20, 1, {4.0, 0.0})
+  end
+
+  test "a closet without room for the fleet is refused, with how many would fit", %{
+    tmp_dir: dir
+  } do
+    # Of 2.6 x 2.6 m, in a hall.
+    map =
+      map(dir, {16, 12}, fn x, y ->
+        box?(x, y, {2.9, -0.1, 5.7, 2.7}) and not box?(x, y, {3.0, 0.0, 5.6, 2.6})
+      end)
+
+    {:error, line} = choose(map, 5, 1, {4.3, 1.3})
+
+    assert line =~
+             ~r/^5 robots cannot start in map .*: there is room for \d, with ways to the landmark at 4.3,1.3$/
+
+    assert {:ok, _landmark, _poses} = choose(map, 5)
   end
 
   test "a landmark that is given is reached round corners, through doors, close to a wall", %{

@@ -8,7 +8,7 @@ defmodule Swarm.Formation.Ladder do
   | `:turned` | turned about the leader, in steps of 15 degrees, by as little as it needs |
   | `:closer` | the same with less spacing, down to 0.8 m |
   | `:column` | a column along the leader's trail |
-  | `:cluster` | the nearest free places round the leader, behind one another where they must be |
+  | `:cluster` | the nearest free places round the leader that a way leads to, behind one another where they must be |
 
   Each robot of a shape can drive straight from its place to the leader's, or to that of a robot before it, so that no shape
   extends behind a wall; and none stands between the leader and what it faces, or nearer to that than the leader.
@@ -49,9 +49,15 @@ defmodule Swarm.Formation.Ladder do
         }
 
   @typedoc """
-  Where the leader is, how far ahead of it stands what it faces (metres), and where it came from.
+  Where the leader is, how far ahead of it stands what it faces (metres), and where it came from; and where its followers
+  `stand`, which a cluster takes for places if there are too few others.
   """
-  @type here :: %{pose: Pose.t(), distance: float(), trail: Trail.t()}
+  @type here :: %{
+          required(:pose) => Pose.t(),
+          required(:distance) => float(),
+          required(:trail) => Trail.t(),
+          optional(:stand) => [Pose.point()]
+        }
 
   @doc "All rungs, the best first."
   @spec rungs() :: [rung(), ...]
@@ -131,13 +137,17 @@ defmodule Swarm.Formation.Ladder do
   end
 
   defp rung(:cluster, asked, followers, here, space) do
-    clusters = for apart <- @apart, spots = cluster(apart, 1, followers, here, space), do: spots
+    clusters =
+      for apart <- @apart, spots = cluster(apart, 1, followers, here, space, []), do: spots
+
     leader = Pose.point(here.pose)
     near? = fn spots -> Enum.all?(spots, &Space.joined?(space, &1, leader)) end
+    least = List.last(@apart)
 
     spots =
       Enum.find(clusters, near?) || List.last(clusters) ||
-        cluster(List.last(@apart), @finer, followers, here, space)
+        cluster(least, @finer, followers, here, space, []) ||
+        cluster(least, @finer, followers, here, space, Map.get(here, :stand, []))
 
     if spots, do: told(asked, spots)
   end
@@ -155,20 +165,22 @@ defmodule Swarm.Formation.Ladder do
     end)
   end
 
-  # Of a lattice that is `finer` times as fine as robots stand apart, only places that far apart are taken.
-  defp cluster(apart, finer, followers, here, space) do
+  # Of a lattice that is `finer` times as fine as robots stand apart, only places that far apart are taken, to which a way
+  # leads; then those where robots `stand`.
+  defp cluster(apart, finer, followers, here, space, stand) do
     apart = 2 * space.radius + apart
     open = :gb_sets.singleton({0.0, {0, 0}})
     limits = {apart / finer, @most * finer * finer}
     found = flood(open, MapSet.new([{0, 0}]), [], limits, here, space)
+    way? = fn point -> point in stand or Space.way?(space, here.pose, point) end
+    stood = Enum.filter(stand, &(Space.free?(space, &1) and not hides?(&1, here)))
 
     {spots, _before} =
-      found
-      |> Enum.reverse()
-      |> Enum.flat_map_reduce([Pose.point(here.pose)], fn point, before ->
-        if Enum.all?(before, &(Pose.distance(&1, point) > apart - 1.0e-6)),
-          do: {[facing(point, here)], [point | before]},
-          else: {[], before}
+      Enum.flat_map_reduce(Enum.reverse(found) ++ stood, [Pose.point(here.pose)], fn at, before ->
+        if length(before) <= followers and
+             Enum.all?(before, &(Pose.distance(&1, at) > apart - 1.0e-6)) and way?.(at),
+           do: {[facing(at, here)], [at | before]},
+           else: {[], before}
       end)
 
     if length(spots) >= followers, do: Enum.take(spots, followers)

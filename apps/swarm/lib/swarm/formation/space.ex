@@ -36,6 +36,13 @@ defmodule Swarm.Formation.Space do
       (space.grid == nil or Grid.free?(space.grid, point(place), radius + @from_wall))
   end
 
+  @doc "Whether a way leads from one place to another, past the walls."
+  @spec way?(t(), Pose.t() | Pose.point(), Pose.t() | Pose.point()) :: boolean()
+  def way?(%__MODULE__{grid: nil}, _from, _to), do: true
+
+  def way?(%__MODULE__{grid: grid, radius: radius}, from, to),
+    do: Grid.Way.find(grid, point(from), point(to), radius + @beside) != nil
+
   @doc "Whether no wall is between two places, so that a robot can drive straight from one to the other."
   @spec joined?(t(), Pose.t() | Pose.point(), Pose.t() | Pose.point()) :: boolean()
   def joined?(%__MODULE__{grid: nil}, _a, _b), do: true

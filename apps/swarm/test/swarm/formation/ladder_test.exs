@@ -43,6 +43,31 @@ defmodule Swarm.Formation.LadderTest do
     end
   end
 
+  test "a cluster has no place that no way leads to, and takes those where robots stand if there are too few" do
+    # A room of 2.6 x 2 m, closed.
+    walls = [
+      {-2.1, -1.1, 0.7, -1.0},
+      {-2.1, 1.0, 0.7, 1.1},
+      {-2.1, -1.1, -2.0, 1.1},
+      {0.6, -1.1, 0.7, 1.1}
+    ]
+
+    space = space(walls)
+    inside? = &(&1.x > -2.0 and &1.x < 0.6 and abs(&1.y) < 1.0)
+    cluster = &Ladder.choose([:cluster], {:column, 1.0}, &1, &2, space)
+
+    %{spots: spots} = cluster.(1, here())
+    assert Enum.all?(spots, inside?)
+    assert cluster.(9, here()) == nil
+
+    # Those beside others, and in a wall, are none.
+    stand = [{3.0, 3.0}, {-3.0, 3.0}, {-3.0, 3.1}, {-1.0, 3.0}, {0.65, 0.0}]
+    most = Enum.find(9..1//-1, &cluster.(&1, here()))
+    assert %{rung: :cluster, spots: spots} = cluster.(most + 3, Map.put(here(), :stand, stand))
+    assert spots |> Enum.reject(inside?) |> Enum.map(&Pose.point/1) |> length() == 3
+    assert cluster.(most + 4, Map.put(here(), :stand, stand)) == nil
+  end
+
   test "a wall behind the leader turns the column, by as little as it needs" do
     space = space([{-2.0, -6.0, -1.8, 1.0}])
 

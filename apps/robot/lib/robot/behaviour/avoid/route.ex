@@ -7,6 +7,7 @@ defmodule Robot.Behaviour.Avoid.Route do
   alias Robot.Percept
   alias Nav.{Grid, PathPlanner}
   alias Robot.Behaviour.Avoid.Neighbours
+  alias Robot.Safety.Reflex.Body
 
   @enforce_keys [:corners, :goal, :at_ms]
   defstruct @enforce_keys ++ [way?: true, rough?: false, shut_ms: nil]
@@ -120,21 +121,23 @@ defmodule Robot.Behaviour.Avoid.Route do
   # that do not move, or past the walls alone; `nil` if there is none. What only sonars saw may be gone: if it leaves no
   # way, the robot goes by the plan, and looks again.
   defp past_walls(corners, from, goal, %{grid: grid, ways: ways} = percept, bodies) do
-    if no_wall?(corners, from, percept) do
+    if no_wall?(corners, from, percept, Body.turning_room(percept.profile)) do
       corners
     else
-      (ways && round_walls(ways, from, goal, percept.profile.radius, bodies)) ||
-        round_walls(grid, from, goal, percept.profile.radius, bodies)
+      (ways && round_walls(ways, from, goal, percept.profile, bodies)) ||
+        round_walls(grid, from, goal, percept.profile, bodies)
     end
   end
 
-  defp round_walls(grid, from, goal, own, bodies) do
+  # The wide margin is that with which the gate lets it turn anywhere on the way.
+  defp round_walls(grid, from, goal, %{radius: own} = profile, bodies) do
+    wide = max(@from_wall, Body.turning_room(profile) - own)
     way = fn discs, margin -> Grid.Way.find(grid, from, goal, own + margin, discs) end
 
     # Most places that cannot be reached are behind walls: one search tells.
     with [_ | _] = loosest <- way.([], @by_wall) do
       Enum.find_value(
-        for(discs <- Enum.uniq(bodies), margin <- [@from_wall, @by_wall], do: {discs, margin}),
+        for(discs <- Enum.uniq(bodies), margin <- [wide, @by_wall], do: {discs, margin}),
         fn
           {[], @by_wall} -> loosest
           {discs, margin} -> way.(discs, margin)
@@ -143,14 +146,15 @@ defmodule Robot.Behaviour.Avoid.Route do
     end
   end
 
-  defp no_wall?(_corners, _from, %{grid: nil}), do: true
+  defp no_wall?(corners, from, percept, room \\ 0.0)
+  defp no_wall?(_corners, _from, %{grid: nil}, _room), do: true
 
-  defp no_wall?([place | rest], from, %{grid: grid, profile: profile} = percept) do
-    Grid.passes?(percept.ways || grid, from, place, profile.radius + @by_wall) and
-      no_wall?(rest, place, percept)
+  defp no_wall?([place | rest], from, %{grid: grid, profile: profile} = percept, room) do
+    Grid.passes?(percept.ways || grid, from, place, max(room, profile.radius + @by_wall)) and
+      no_wall?(rest, place, percept, room)
   end
 
-  defp no_wall?([], _from, _percept), do: true
+  defp no_wall?([], _from, _percept, _room), do: true
 
   defp body(%{at: {x, y}, radius: radius}), do: {x, y, radius}
 

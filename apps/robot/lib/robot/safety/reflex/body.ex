@@ -23,6 +23,8 @@ defmodule Robot.Safety.Reflex.Body do
   @beside_growth 4.0
   # The range (metres) that is assumed for an obstacle too near to be measured.
   @touching 0.05
+  # A range is that of an obstacle too near if it is so little more than the sonar's minimum.
+  @unmeasured 0.005
 
   @doc """
   The points that a sonar ring sees. A sonar without an echo, or with a reading that is not a
@@ -42,7 +44,7 @@ defmodule Robot.Safety.Reflex.Body do
   defp points([pose | poses], [range | ranges], profile)
        when is_number(range) and range >= 0 and range < profile.sonar_max do
     # At the sonar's minimum range, the obstacle may be anywhere nearer.
-    range = if range <= profile.sonar_min + 0.005, do: min(range, @touching), else: range
+    range = if range <= profile.sonar_min + @unmeasured, do: min(range, @touching), else: range
     x = pose.x + range * :math.cos(pose.heading)
     y = pose.y + range * :math.sin(pose.heading)
     [{x, y} | points(poses, ranges, profile)]
@@ -148,6 +150,31 @@ defmodule Robot.Safety.Reflex.Body do
       end
 
     fastest(profile.max_turn_acceleration, max(free - 0.1, 0.0), profile.sonar_round_s)
+  end
+
+  @doc """
+  How far from all that stands about (metres) the body must be to turn freely: where a longer one is nearer, a sonar may be
+  so near that the obstacle counts as touching it.
+
+      iex> for profile <- [Hal.Profile.magellan(), Hal.Profile.atrv_mini()],
+      ...>   do: Float.round(Robot.Safety.Reflex.Body.turning_room(profile), 3)
+      [0.2, 0.385]
+  """
+  @spec turning_room(Profile.t()) :: float()
+  def turning_room(%Profile{length: length, width: width, radius: radius}) when length == width,
+    do: radius
+
+  def turning_room(%Profile{sonars: sonars, sonar_min: least, radius: radius}) do
+    reach = least + @unmeasured
+
+    for %{x: x, y: y, heading: heading} <- sonars do
+      :math.sqrt(
+        :math.pow(x + reach * :math.cos(heading), 2) +
+          :math.pow(y + reach * :math.sin(heading), 2)
+      )
+    end
+    |> Enum.max(fn -> radius end)
+    |> max(radius)
   end
 
   @doc """
