@@ -3,8 +3,8 @@
     "A person puts the landmark behind the last robot, where no camera looks; that robot leads, and the fleet forms again.",
   robots: 6,
   seed: 1,
-  blobs: :direct,
   duration_s: 120,
+  blobs: :direct,
   script: [
     {40, {:remove_landmark}},
     {40, {:move, {-7.2, 1.8}}}
