@@ -8,6 +8,7 @@ defmodule Lab.PlacementsTest do
   alias Lab.{Run, Trial}
   alias Sim.Floorplan
 
+  @robots [:mag1, :mag2, :mag3, :min1, :min2, :min3]
   @shapes [:column, :wedge, :line, :diamond, :triangle]
   # Six robots that have been in formation for 5 s; most fleets are after 30 s.
   @settled_ms 5_000
@@ -40,6 +41,61 @@ defmodule Lab.PlacementsTest do
     assert Enum.all?(runs, &(&1.collisions == 0 and &1.nearest_m > @touch))
   end
 
+  @tag :long
+  @tag timeout: 1_800_000
+  test "carried through a door at 0.3 m/s, no robot touches another" do
+    runs =
+      1..44
+      |> Task.async_stream(&carried/1, timeout: :infinity)
+      |> Enum.map(fn {:ok, run} -> run end)
+
+    formed = for %{formed_ms: ms} when ms != nil <- runs, do: ms
+    through = Enum.count(runs, & &1.through?)
+
+    IO.puts(
+      "landmark through the door: #{through} of 44; in formation again: #{length(formed)}, #{quantiles(formed)}"
+    )
+
+    assert Enum.all?(runs, &(&1.collisions == 0))
+  end
+
+  # It takes 28 s from one room to the other, if no robot is in its way; 170 s later the run ends.
+  @carry {60, {7.5, 0.0}}
+  @there_ms 89_000
+  defp carried(seed) do
+    Trial.Memory.prepare()
+    {at_s, goal} = @carry
+
+    {:ok, trial} =
+      Trial.new(%{
+        robots: @robots,
+        seed: seed,
+        map: "doorway",
+        blobs: :direct,
+        plan: :known,
+        landmark: {-1, 0},
+        formation: {:wedge, 1.0},
+        duration_s: 1_000,
+        script: [{at_s, {:move, goal}}]
+      })
+
+    trial = Run.play(trial, &(&1.at_ms >= 260_000))
+
+    formed =
+      Enum.find(
+        Trial.stages(trial),
+        &(&1.stage == :formed and &1.at_s * 1000 > at_s * 1000 + 15_000)
+      )
+
+    through? = trial.world.landmark == goal
+
+    %{
+      formed_ms: if(through? and formed, do: max(round(formed.at_s * 1000) - @there_ms, 0)),
+      through?: through?,
+      collisions: trial.world.collisions
+    }
+  end
+
   defp each(seeds, play) do
     seeds
     |> Task.async_stream(&(&1 |> formed() |> play.()), timeout: :infinity)
@@ -53,6 +109,8 @@ defmodule Lab.PlacementsTest do
     end
   end
 
+  defp quantiles([]), do: "never"
+
   defp quantiles(times) do
     times = Enum.sort(times)
     at = fn share -> Enum.at(times, floor(share * (length(times) - 1))) / 1000 end
@@ -65,7 +123,7 @@ defmodule Lab.PlacementsTest do
 
     {:ok, trial} =
       Trial.new(%{
-        robots: [:mag1, :mag2, :mag3, :min1, :min2, :min3],
+        robots: @robots,
         seed: seed,
         blobs: :direct,
         plan: :known,

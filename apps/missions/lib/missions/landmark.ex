@@ -13,7 +13,7 @@ defmodule Missions.Landmark do
   | `Leader` | what the leader tells: the anchor, the order, whether the shape is formed; `.Loss` what it does without the landmark |
   | `Shape` | a shape that there is room for |
   | `SelfReport`, `Claim` | what it claims of itself: to people, and to the others |
-  | `Follower` | what a follower does: its slot, its gaze, its child; `.Guide` tells one without pictures where it stands |
+  | `Follower` | what a follower does: its slot, its child; `.Gaze` where it looks; `.Guide` tells one without pictures where it stands |
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
   | `Merge` | what becomes of two leaders that meet |

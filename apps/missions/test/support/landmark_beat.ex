@@ -11,6 +11,14 @@ defmodule Missions.Landmark.Beat do
     struct!(Heartbeat, plain ++ [claim: Claim.new(Landmark, Map.new(claim))] ++ body)
   end
 
+  @doc "An anchor of :mag1, which leads a column of these followers and says where the landmark is (mm)."
+  def anchor(order, landmark) do
+    followers = length(order)
+    shape = [formation: {:column, 1.0}, size: followers + 1, places: Enum.to_list(1..followers)]
+    here = [leader: :mag1, epoch: 1, sequence: 1, pose: {0, 0, 0}, twist: {0, 0}]
+    struct!(Landmark.Reference, here ++ shape ++ [order: order, landmark: landmark])
+  end
+
   @doc "The message by which a robot passes an anchor on to its child."
   def pass_on(from, anchor) do
     claim = Robot.Mission.Claim.new(Missions.Landmark, %{anchor: anchor})

@@ -5,7 +5,7 @@ defmodule Missions.Landmark.Rounds.Challenge do
   # | reason | it holds for | no earlier in a reign than |
   # |---|---|---|
   # | `nearer`: it sees the landmark nearer than the leader does, by 0.5 m or a fifth of the distance | 2 s | 10 s |
-  # | `gone`: the leader does not see the landmark, and this robot sees it elsewhere than the leader last said, and is not farther from it than the leader by 0.5 m | 0.5 s | 3 s |
+  # | `gone`: the leader does not see it, and this robot, not 0.5 m farther from it, sees it elsewhere than it was | 0.5 s | 3 s |
   # | `blind`: the leader does not see the landmark, and this robot does | 3 s | 10 s |
   #
   # So leadership cannot oscillate. As long as the landmark has not moved, a robot that passes it on the way to its slot does

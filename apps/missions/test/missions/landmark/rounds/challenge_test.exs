@@ -2,7 +2,7 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
   @moduledoc "A follower asks for a new leader when it is clearly nearer, for long enough, and not at once."
   use ExUnit.Case, async: true
   alias Missions.Landmark
-  alias Missions.Landmark.{Beat, LandmarkTrack, Reference}
+  alias Missions.Landmark.{Beat, LandmarkTrack}
   alias Missions.Landmark.Rounds.Challenge
 
   # A follower in its place since `since_ms`, this far from the landmark; its leader is 3 m from it.
@@ -19,25 +19,14 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
       since_ms: since_ms,
       follower: %{in_place?: true, landmark: nil},
       anchor: anchor({round(metres * 1000), 0}),
+      anchor_ms: 0,
       sight: sight(metres, 20_000),
       percept: %{pose: Hal.Pose.new(0, 0), peers: %{mag1: %{at_ms: 0, beat: beat}}}
     }
   end
 
   # Where the leader last said that the landmark was.
-  defp anchor(landmark),
-    do: %Reference{
-      leader: :mag1,
-      epoch: 1,
-      sequence: 1,
-      pose: {0, 0, 0},
-      twist: {0, 0},
-      formation: {:column, 1.0},
-      order: [:mag2],
-      size: 2,
-      places: [1],
-      landmark: landmark
-    }
+  defp anchor(landmark), do: Beat.anchor([:mag2], landmark)
 
   defp sight(metres, size_ppm),
     do: %LandmarkTrack{
@@ -91,6 +80,12 @@ defmodule Missions.Landmark.Rounds.ChallengeTest do
     # As far as the distance of something so far away is known.
     far = %{follower(8.0, 0, nil) | anchor: anchor({6_500, 0})}
     assert asks_after(far, 20_000) == 3_000
+  end
+
+  test "one that is farther from it than its leader asks after 3 s: the leader may follow it behind a corner" do
+    gone = %{follower(4.0, 0, nil) | anchor: anchor({-3_000, 0})}
+    assert asks_after(put_in(gone.anchor.pose, {400, 0, 0}), 20_000) == 500
+    assert asks_after(put_in(gone.anchor.pose, {1_000, 0, 0}), 20_000) == 3_000
   end
 
   test "of two that see it elsewhere the one that sees it larger asks; of two equals, either" do
