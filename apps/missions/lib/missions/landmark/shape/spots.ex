@@ -64,7 +64,9 @@ defmodule Missions.Landmark.Shape.Spots do
     {near, other} =
       for({x, y} <- here.stand, do: Pose.new(x, y, here.pose.heading))
       |> Enum.sort_by(&(-Pose.distance(&1, here.pose)))
-      |> Enum.split_with(fn own -> Enum.any?(places, &(Pose.distance(&1, own) < space.radius)) end)
+      |> Enum.split_with(fn own ->
+        Enum.any?(places, &(Pose.distance(&1, own) < space.radius))
+      end)
 
     spots = Enum.take(places ++ other ++ near, followers)
     if spots != [] and length(spots) == followers, do: spots
