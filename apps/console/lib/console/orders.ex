@@ -5,7 +5,8 @@ defmodule Console.Orders do
 
   An order that has waited for half a second is not carried out, and robots refuse one that was given before they
   were stopped (`Swarm.given/2`). A stop does not wait: it starts beside the order that is under way, and the orders that
-  wait are dropped. Of more than eight that wait the oldest is dropped. Whatever is dropped is answered.
+  wait are dropped. Of more than eight that wait the oldest is dropped. Whatever is dropped is answered. What is given after
+  an emergency stop waits until that is answered, so that a reset never overtakes it; a question does not wait.
 
   A word of driving takes the place of the one of the same robot that still waits. It lasts from when it was said, not
   from when its turn comes.
@@ -135,8 +136,15 @@ defmodule Console.Orders do
   end
 
   defp next(%{running: nil, waiting: [order | waiting]} = s) do
-    s = %{s | waiting: waiting}
+    if order.kind != :question and
+         Enum.any?(s.stops, &match?({_ref, {%{key: :estop}, _again}}, &1)),
+       do: s,
+       else: next(order, %{s | waiting: waiting})
+  end
 
+  defp next(s), do: s
+
+  defp next(order, s) do
     case timely(order, age_ms(order)) do
       :ok ->
         %{s | running: {begin(order), order}}
@@ -146,8 +154,6 @@ defmodule Console.Orders do
         next(s)
     end
   end
-
-  defp next(s), do: s
 
   defp timely(%{kind: :order}, age_ms) when age_ms >= @longest_ms, do: Freshness.late(age_ms)
   defp timely(%{kind: {:word, _robot, longest_ms}}, age_ms) when age_ms >= longest_ms, do: :late

@@ -21,8 +21,8 @@ defmodule Console.DemoTest do
     refute text =~ "\e["
   end
 
-  defp first(line) do
-    options = Runs.options(line <> " --duration 1 --blobs direct --noise off")
+  defp first(line, words \\ []) do
+    options = Runs.options(line <> " --duration 1 --blobs direct --noise off", words)
     {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
     text |> String.split("\n") |> hd()
   end
@@ -47,10 +47,10 @@ defmodule Console.DemoTest do
     File.write!(file, "P5 36 28 255\n" <> pixels)
     places = "-?\\d+\\.\\d\\d,-?\\d+\\.\\d\\d"
 
-    assert first("--map #{file}:18x14 --robots 3") =~
+    assert first("--robots 3", ["--map", file <> ":18x14"]) =~
              ~r/plan.pgm:18x14 \(grey is wall; --grey floor makes it floor\), seed 1, column with 1.0 m spacing; the landmark stands at 0.00,0.00; the robots start between #{places} and #{places}$/
 
-    assert first("--map #{file}:18x14 --robots 1 --grey floor --landmark 1,1") =~
+    assert first("--robots 1 --grey floor --landmark 1,1", ["--map", file <> ":18x14"]) =~
              ~r/plan.pgm:18x14, seed 1, column with 1.0 m spacing; the robot starts at #{places}$/
   end
 

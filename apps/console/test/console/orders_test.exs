@@ -65,6 +65,30 @@ defmodule Console.OrdersTest do
     refute_received {:told, _nothing_else, _ref}
   end
 
+  test "a reset does not overtake an emergency stop, and a question waits for none" do
+    orders = orders()
+    line(orders, "estop")
+    assert_receive {:told, :estop, estop}
+    {:ok, question} = Line.order("help", nil, [:mag1], {Console.Live.Fleet, nil})
+    Orders.give(orders, %{question | given_us: now_us()})
+    assert_receive {:answer, "help", {:ok, [_line | _more]}}
+
+    line(orders, "reset")
+    line(orders, "stop mag2")
+    assert_receive {:told, {:tell, [:mag2], :stop}, stop}
+    assert_receive {:answer, "reset", {:error, "not carried out: stopped" <> _}}
+    line(orders, "reset")
+    answer(stop)
+    assert_receive {:answer, "stop mag2", {:ok, "done"}}
+    refute_received {:told, :reset, _ref}
+
+    answer(estop)
+    assert_receive {:told, :reset, reset}
+    assert_received {:answer, "estop", {:ok, "done"}}
+    answer(reset)
+    assert_receive {:answer, "reset", {:ok, "done"}}
+  end
+
   test "an order that has waited for half a second is not carried out; a stop and a question are" do
     orders = orders()
     line(orders, "start", now_us() - 600_000)

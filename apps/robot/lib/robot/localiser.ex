@@ -213,7 +213,7 @@ defmodule Robot.Localiser do
     cond do
       filter.at_ms == before.at_ms -> localiser
       filter.search != nil -> astray(localiser, before, percept)
-      true -> agree(localiser, MonteCarlo.estimate(filter))
+      true -> agree(localiser, MonteCarlo.estimate(filter, localiser.walls.trust.trusted?))
     end
   end
 

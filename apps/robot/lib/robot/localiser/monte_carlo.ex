@@ -91,8 +91,8 @@ defmodule Robot.Localiser.MonteCarlo do
   @typedoc """
   `held` are the particles of the place where the robot is, as far as it knows, `nil` for none; `search` those of a lost robot
   everywhere else; `rivals` are the other places that fit. `at` is the odometry at the last look, whose `number` it is; `last` is
-  the odometry since, `turned` the sum of all angles since (radians), `way` the way since the place is held (metres). `shown` counts
-  good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
+  the odometry since, `turned` the sum of all angles since (radians), `way` the way since the place is held, or since it did not fit
+  before it was shown to (metres). `shown` counts good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
   rival, and those of another one with rivals.
   """
   @type t :: %__MODULE__{
@@ -180,13 +180,19 @@ defmodule Robot.Localiser.MonteCarlo do
   @spec lost?(t()) :: boolean()
   def lost?(%__MODULE__{search: search, shown: shown}), do: search != nil and shown >= @shown
 
-  @doc "Where the robot surely is by the plan, and the variance of that; `nil` if it does not surely know."
-  @spec estimate(t()) :: {Pose.t(), Modes.variance()} | nil
-  def estimate(%__MODULE__{state: :tracking, shown: shown, held: %{good: good} = held} = filter)
-      when shown >= @shown and good >= @shown,
+  @doc """
+  Where the robot surely is by the plan, and the variance of that; `nil` if it does not surely know. A plan that was not
+  `trusted?` must fit over a longer way: two walls of another building may fit for a metre.
+  """
+  @spec estimate(t(), trusted? :: boolean()) :: {Pose.t(), Modes.variance()} | nil
+  def estimate(
+        %__MODULE__{state: :tracking, shown: shown, held: %{good: good} = held} = filter,
+        trusted?
+      )
+      when shown >= @shown and good >= @shown and (trusted? or filter.way >= @found_way),
       do: {Pose.compose(held.pose, Pose.relative(filter.at, filter.last)), held.variance}
 
-  def estimate(%__MODULE__{}), do: nil
+  def estimate(%__MODULE__{}, _trusted?), do: nil
 
   @doc """
   The filter after a tick. `hint` is where the belief is, by what else it knows, `nil` if that is vague; `among` where the robot
@@ -265,10 +271,12 @@ defmodule Robot.Localiser.MonteCarlo do
     share = fits / counting
 
     {better?, good?} = {share < @doubtful and better?(held, look, percept), share >= @good}
+    open? = filter.shown < @shown and not good?
 
     %{
       filter
       | held: held,
+        way: if(open?, do: 0.0, else: filter.way),
         slow: mean(filter.slow, share, @slow),
         fast: mean(filter.fast, share, @fast),
         shown: shown(filter.shown, good?),

@@ -4,6 +4,11 @@ defmodule Robot.Localiser.WallsTest do
   alias Robot.{Localiser, Room}
   alias Robot.Localiser.{Anchors, Covariance}
 
+  setup do
+    :rand.seed(:exsss, 1)
+    :ok
+  end
+
   @size {6.0, 4.0}
   @start Pose.new(1.0, 1.0)
   @corners [{5.0, 1.0}, {5.0, 3.0}, {1.0, 3.0}, {1.0, 1.0}]
@@ -60,16 +65,20 @@ defmodule Robot.Localiser.WallsTest do
     end
   end
 
-  test "with a wrong plan it finds out, and goes on by dead reckoning" do
-    for size <- [{9.0, 4.6}, {4.8, 7.0}] do
+  # With seed 13 two walls of the larger plan fit for a metre at the end.
+  test "with a wrong plan it finds out, and says how far off it may be" do
+    for seed <- [1, 7, 11, 13], size <- [{9.0, 4.6}, {4.8, 7.0}] do
+      :rand.seed(:exsss, seed)
       track = drive(2)
       {off, radius, localiser} = follow(track, Room.plan(size))
       {dead, dead_radius, _localiser} = follow(track, nil)
 
       # A plan that was right for a while may be that of another building, or the robot may have been carried away.
       assert localiser.lost? or not localiser.walls.trust.trusted?
-      assert off < dead + 0.2
+      assert off < radius
       assert radius > 0.8 * dead_radius
+      # Without the plan it goes on by dead reckoning.
+      if not localiser.lost?, do: assert(off < dead + 0.2)
     end
   end
 

@@ -46,7 +46,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
 
   @doc """
   All other robots, nearest first, extrapolated to the present time. A robot that is not sure of its own place leaves out those that
-  its sonars would hear there, and do not: it is beside where it believes to be, and avoids what it hears.
+  two of its sonars would hear there, and do not: it is beside where it believes to be, and avoids what it hears.
   """
   @spec robots(Percept.t()) :: [t()]
   def robots(%Percept{pose: pose} = percept) do
@@ -59,17 +59,19 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   defp unsure?(%{uncertainty: %{radius: radius}, sonar: [_ | _]}), do: radius > @unsure
   defp unsure?(_percept), do: false
 
-  # A sonar points at its middle, and hears nothing up to well behind its front.
+  # One sonar may fail, or miss an echo: two must look at it, and hear nothing up to well behind its front.
   defp unheard?(%{at: at, radius: radius}, %{pose: pose, profile: profile, sonar: ranges}) do
-    Enum.zip(profile.sonars, ranges)
-    |> Enum.any?(fn {mount, range} ->
-      from = Pose.compose(pose, mount)
-      distance = Pose.distance(from, at)
+    echoes =
+      for {mount, range} <- Enum.zip(profile.sonars, ranges),
+          is_number(range),
+          from = Pose.compose(pose, mount),
+          distance = Pose.distance(from, at),
+          distance < @heard and distance > radius,
+          half = :math.asin(radius / distance) / 1.5,
+          abs(Pose.bearing(from, at)) < profile.sonar_cone / 2 + half,
+          do: range > distance - radius + @beyond
 
-      distance < @heard and distance > radius and is_number(range) and
-        range > distance - radius + @beyond and
-        abs(Pose.bearing(from, at)) < min(profile.sonar_cone / 2, :math.asin(radius / distance))
-    end)
+    match?([_, _ | _], echoes) and Enum.all?(echoes)
   end
 
   @doc """
