@@ -8,7 +8,9 @@ defmodule Missions.Landmark.Shape do
   # leader's trail, then a cluster round it. When half of them are blocked, at least three, the cluster
   # follows at once. In a cluster, a place that a follower could not get to is left out of the next ones for a while: what kept
   # it from it, such as another robot, may be gone. If no other place is left, it tries again. Once the leader has moved on, or
-  # a person asks for a shape, the requested shape is tried again. Where there is no room for all, those for which there is none
+  # a person asks for a shape, the requested shape is tried again. The shape closes up to 0.8 m, too, when all stand in their slots
+  # and some have not become sure of that for long: what a robot knows of its place is worse the farther it is from the leader.
+  # Where there is no room for all, those for which there is none
   # stand where they are: a place in a wall is none.
   #
   # A leader that knows of walls chooses by `Swarm.Formation.Ladder`: the best rung that fits where it stands, a lower one
@@ -18,22 +20,13 @@ defmodule Missions.Landmark.Shape do
   alias Swarm.Formation
   alias Swarm.Formation.{FreeSlots, Ladder, Space, Trail}
   alias Missions.Landmark
-  alias Missions.Landmark.{Claim, LandmarkTrack}
-  alias Missions.Landmark.Shape.Spots
+  alias Missions.Landmark.LandmarkTrack
+  alias Missions.Landmark.Shape.{Spots, Squeeze}
 
-  # How long followers have to take what they were given, places of a cluster longer.
-  @step_ms 3_000
-  @cluster_ms 8_000
   @step 0.1
-  @elsewhere 1.0
 
-  # So many blocked followers, if they are half of all, show that the shape does not fit.
-  @many 3
-  # A follower that is faster (m/s) drives on.
-  @drives 0.05
-  # What stands in a place of the cluster that a follower could not get to: its radius in metres, and how long.
+  # The radius (metres) of what stands in a place of the cluster that a follower could not get to.
   @barred 0.05
-  @barred_ms 30_000
 
   # A leader that has moved this far (metres) chooses again when it stands, and one whose shape has not fitted for
   # this long while it drives, or that has found room for none.
@@ -46,6 +39,7 @@ defmodule Missions.Landmark.Shape do
             room: nil,
             squeeze: 0,
             squeezed_ms: nil,
+            unsure_ms: nil,
             at: nil,
             rung: :asked,
             spots: nil,
@@ -57,7 +51,7 @@ defmodule Missions.Landmark.Shape do
   @typedoc """
   `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
   slots of the formation; `barred` are places where a follower was blocked, and when;
-  `proven` those where one has stood. The choice was made for `chosen`: the request, the number of followers, how often they could not
+  `proven` those where one has stood; since `unsure_ms` all stand in their slots, and some are not sure of that. The choice was made for `chosen`: the request, the number of followers, how often they could not
   get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
   """
   @type t :: %__MODULE__{
@@ -65,6 +59,7 @@ defmodule Missions.Landmark.Shape do
           trail?: boolean(),
           room: FreeSlots.t() | nil,
           squeeze: non_neg_integer(),
+          unsure_ms: integer() | nil,
           rung: Ladder.rung() | nil,
           spots: [Pose.t()] | nil,
           barred: [{Pose.point(), at_ms :: integer()}],
@@ -82,7 +77,7 @@ defmodule Missions.Landmark.Shape do
   """
   @spec update(t(), Landmark.State.t(), distance :: float()) :: t()
   def update(shape, mission, distance) do
-    shape = shape |> relax(mission) |> squeeze(mission) |> lapse(mission.now_ms)
+    shape = Squeeze.update(shape, mission, last(mission))
 
     if mission.percept.grid != nil or shape.squeeze >= last(mission),
       do: fit(shape, mission, distance),
@@ -160,7 +155,7 @@ defmodule Missions.Landmark.Shape do
 
   defp prove(%{spots: spots, proven: proven} = shape, mission) do
     more =
-      for {index, %{in_place: true}} <- followers(mission),
+      for {index, %{in_place: true}} <- Squeeze.followers(mission),
           spot = Enum.at(spots, index),
           spot not in proven,
           do: spot
@@ -303,78 +298,6 @@ defmodule Missions.Landmark.Shape do
     |> Enum.reverse()
     |> Enum.map(&Landmark.State.millimetres/1)
   end
-
-  defp relax(%{squeeze: 0} = shape, _mission), do: shape
-
-  defp relax(shape, mission) do
-    if Pose.distance(mission.percept.pose, shape.at) > @elsewhere,
-      do: %{shape | squeeze: 0, squeezed_ms: mission.now_ms, barred: []},
-      else: shape
-  end
-
-  defp squeeze(shape, mission) do
-    time_ms = if shape.rung == :cluster, do: @cluster_ms, else: @step_ms
-    due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= time_ms
-    steps = if due? and shape.rung != nil, do: steps(shape, mission), else: 0
-
-    if steps > 0,
-      do: %{
-        bar(shape, mission)
-        | squeeze: shape.squeeze + steps,
-          squeezed_ms: mission.now_ms,
-          at: Pose.point(mission.percept.pose)
-      },
-      else: shape
-  end
-
-  # A robot reports that it is blocked, and all others have come to rest in their places: as long
-  # as some are under way, one of them may be the blocker. A robot that is not sure of its place
-  # counts as at rest, too. If many are blocked, it is not each other that they are blocked by.
-  defp steps(shape, mission) do
-    followers = followers(mission)
-    blocked = Enum.count(followers, fn {_index, claim} -> claim.blocked end)
-    rest? = fn {_index, claim} -> claim.blocked or claim.in_place or claim.unsure end
-
-    cond do
-      blocked >= @many and 2 * blocked >= length(followers) ->
-        max(last(mission) - shape.squeeze, 1)
-
-      # In a cluster only blocked robots get another place.
-      blocked > 0 and (shape.rung == :cluster or Enum.all?(followers, rest?)) ->
-        1
-
-      true ->
-        0
-    end
-  end
-
-  # What the followers that are heard claim, each with its number in the order. One that drives on, as on a long way that it
-  # drives slowly because it is unsure of its place, is not kept from it yet.
-  defp followers(mission) do
-    beats = Landmark.State.beats(mission)
-
-    for {id, index} <- Enum.with_index(mission.order), beat = beats[id] do
-      claim = Claim.of(beat)
-      {index, %{claim | blocked: claim.blocked and not drives?(mission.percept.peers[id])}}
-    end
-  end
-
-  defp drives?(%{twist: %{linear: linear}}), do: abs(linear) > @drives
-  defp drives?(_unheard), do: false
-
-  defp bar(%{rung: :cluster, spots: [_ | _] = spots} = shape, mission) do
-    blocked =
-      for {index, %{blocked: true}} <- followers(mission),
-          spot = Enum.at(spots, index),
-          do: {Pose.point(spot), mission.now_ms}
-
-    %{shape | barred: blocked ++ shape.barred}
-  end
-
-  defp bar(shape, _mission), do: shape
-
-  defp lapse(%{barred: barred} = shape, now),
-    do: %{shape | barred: Enum.filter(barred, fn {_place, at_ms} -> now - at_ms < @barred_ms end)}
 
   defp formation(asked, 0), do: {asked, false}
 

@@ -64,6 +64,23 @@ defmodule Missions.Landmark.ShapeTest do
     for {x, y, _heading} <- places, do: assert(Pose.distance({x, y}, {1_600, 0}) > 1_600)
   end
 
+  test "all come as close as may be once one that stands in its slot has not become sure of it for 15 s" do
+    stand = fn shape, claims, seconds ->
+      for ms <- seconds,
+          reduce: shape,
+          do: (shape -> Shape.update(shape, mission(claims, 1_000 * ms), 1.6))
+    end
+
+    unsure = for id <- @ids, do: {id, if(id == :mag5, do: [unsure: true], else: [in_place: true])}
+    under_way = Keyword.put(unsure, :mag2, [])
+
+    assert %{formation: @asked} = shape = stand.(Shape.new(), unsure, 10..24)
+    # One that leaves its slot meanwhile: it begins anew.
+    assert %{formation: @asked} = stand.(shape, under_way, [25]) |> stand.(unsure, 26..40)
+    assert %{formation: {:column, 0.8}, rung: :closer} = closer = stand.(shape, unsure, [25])
+    assert stand.(closer, unsure, 26..90) == %{closer | unsure_ms: 26_000}
+  end
+
   test "whoever does not get to its place of a cluster is given another one, and nobody else moves" do
     before = run([claims(@ids)])
     later = run([claims(@ids), claims([:mag3]) |> rest()])
