@@ -40,6 +40,7 @@ defmodule Missions.Landmark.Shape do
             squeeze: 0,
             squeezed_ms: nil,
             unsure_ms: nil,
+            closest?: false,
             at: nil,
             rung: :asked,
             spots: nil,
@@ -51,8 +52,9 @@ defmodule Missions.Landmark.Shape do
   @typedoc """
   `rung` is that of `Swarm.Formation.Ladder`, `nil` if there is none; `spots` are the poses of the followers if they are not
   slots of the formation; `barred` are places where a follower was blocked, and when;
-  `proven` those where one has stood; since `unsure_ms` all stand in their slots, and some are not sure of that. The choice was made for `chosen`: the request, the number of followers, how often they could not
-  get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
+  `proven` those where one has stood; since `unsure_ms` all stand in their slots, and some are not sure of that; `closest?` if
+  that took so long that the shape is to be as close as may be. The choice was made for `chosen`: the request, the number of
+  followers, how often they could not get in, and where the leader was. A shape that does not fit any more last did at `fit_ms`.
   """
   @type t :: %__MODULE__{
           formation: Formation.t() | nil,
@@ -60,6 +62,7 @@ defmodule Missions.Landmark.Shape do
           room: FreeSlots.t() | nil,
           squeeze: non_neg_integer(),
           unsure_ms: integer() | nil,
+          closest?: boolean(),
           rung: Ladder.rung() | nil,
           spots: [Pose.t()] | nil,
           barred: [{Pose.point(), at_ms :: integer()}],
@@ -87,7 +90,7 @@ defmodule Missions.Landmark.Shape do
   defp fit(shape, mission, distance) do
     %{percept: %{pose: pose}, now_ms: now} = mission
     slow? = Landmark.State.slow?(mission.percept, 0.02)
-    asked = {mission.formation, length(mission.order), shape.squeeze}
+    asked = {wanted(shape, mission.formation), length(mission.order), shape.squeeze}
     here = %{pose: pose, distance: distance, trail: mission.trail, stand: stand(mission)}
     bodies = bodies(mission) ++ for({{x, y}, _at_ms} <- shape.barred, do: {x, y, @barred})
     space = %Space{bodies: bodies, radius: radius(mission), grid: mission.percept.grid}
@@ -132,6 +135,12 @@ defmodule Missions.Landmark.Shape do
         choose(shape, asked, here, space, rungs(shape, mission), mission)
     end
   end
+
+  # The ladder takes the first spacing below the one that is asked for.
+  defp wanted(%{closest?: true}, {kind, spacing}),
+    do: {kind, min(spacing, Float.round(Formation.least_spacing() + @step, 3))}
+
+  defp wanted(_shape, formation), do: formation
 
   defp rungs(%{squeeze: squeeze}, mission),
     do: if(squeeze >= last(mission), do: [:cluster], else: Enum.drop(Ladder.rungs(), squeeze))

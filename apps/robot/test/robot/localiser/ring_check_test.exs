@@ -12,7 +12,7 @@ defmodule Robot.Localiser.RingCheckTest do
   # A room that echoes, by how far it is to its wall from the true pose.
   defp range(%Pose{} = from, {half_width, half_height}) do
     along = fn
-      _at, 0.0, _half -> 9.0
+      _at, way, _half when way == 0 -> 9.0
       at, way, half when way > 0 -> (half - at) / way
       at, way, half -> (-half - at) / way
     end

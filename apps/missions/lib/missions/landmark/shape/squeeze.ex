@@ -26,11 +26,11 @@ defmodule Missions.Landmark.Shape.Squeeze do
     do:
       shape |> relax(mission) |> doubt(mission) |> squeeze(mission, last) |> lapse(mission.now_ms)
 
-  defp relax(%{squeeze: 0} = shape, _mission), do: shape
+  defp relax(%{squeeze: 0, closest?: false} = shape, _mission), do: shape
 
   defp relax(shape, mission) do
     if Pose.distance(mission.percept.pose, shape.at) > @elsewhere,
-      do: %{shape | squeeze: 0, squeezed_ms: mission.now_ms, barred: []},
+      do: %{shape | squeeze: 0, closest?: false, squeezed_ms: mission.now_ms, barred: []},
       else: shape
   end
 
@@ -51,15 +51,30 @@ defmodule Missions.Landmark.Shape.Squeeze do
     due? = mission.now_ms - (shape.squeezed_ms || mission.since_ms) >= time_ms
     steps = if due? and shape.rung != nil, do: steps(shape, mission, last), else: 0
 
-    if steps > 0,
-      do: %{
-        bar(shape, mission)
-        | squeeze: shape.squeeze + steps,
-          squeezed_ms: mission.now_ms,
-          unsure_ms: nil,
-          at: Pose.point(mission.percept.pose)
-      },
-      else: shape
+    cond do
+      steps > 0 -> stepped(bar(shape, mission), steps, mission)
+      due? and unsure?(shape, mission) -> closest(shape, mission, last)
+      true -> shape
+    end
+  end
+
+  defp unsure?(%{rung: rung, closest?: closest?, unsure_ms: since_ms}, mission) do
+    rung not in [nil, :cluster] and not closest? and since_ms != nil and
+      mission.now_ms - since_ms >= @unsure_ms
+  end
+
+  # Two steps before the last, the shape is the requested one with less spacing.
+  defp closest(shape, mission, last),
+    do: stepped(%{shape | closest?: true}, max(last - 2 - shape.squeeze, 0), mission)
+
+  defp stepped(shape, steps, mission) do
+    %{
+      shape
+      | squeeze: shape.squeeze + steps,
+        squeezed_ms: mission.now_ms,
+        unsure_ms: nil,
+        at: Pose.point(mission.percept.pose)
+    }
   end
 
   # A robot reports that it is blocked, and all others have come to rest in their places: as long
@@ -77,10 +92,6 @@ defmodule Missions.Landmark.Shape.Squeeze do
       # In a cluster only blocked robots get another place.
       blocked > 0 and (shape.rung == :cluster or Enum.all?(followers, rest?)) ->
         1
-
-      # Two steps before the last, the shape is the requested one, as close as may be.
-      shape.unsure_ms != nil and mission.now_ms - shape.unsure_ms >= @unsure_ms ->
-        max(last - 2 - shape.squeeze, 0)
 
       true ->
         0
