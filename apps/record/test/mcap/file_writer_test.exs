@@ -203,6 +203,27 @@ defmodule Mcap.FileWriterTest do
     end
 
     @tag :realtime
+    test "writers that begin at the same time have a file each", %{tmp_dir: dir} do
+      for round <- 1..20 do
+        folder = Path.join(dir, "#{round}")
+
+        begun =
+          1..4
+          |> Enum.map(fn _ ->
+            Task.async(fn ->
+              {:ok, writer} =
+                FileWriter.start_link(path: folder, library: "tests", limit_bytes: 4_194_304)
+
+              FileWriter.close(writer)
+            end)
+          end)
+          |> Task.await_many()
+
+        assert Enum.all?(begun, &(&1 == :ok))
+        assert length(File.ls!(folder)) == 4
+      end
+    end
+
     test "large messages of many channels, notes between", %{tmp_dir: dir} do
       {:ok, recorder} = FileWriter.start_link(path: dir, limit_bytes: @limit)
 

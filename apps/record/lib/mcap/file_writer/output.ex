@@ -46,9 +46,7 @@ defmodule Mcap.FileWriter.Output do
   def open(path, limit, options) do
     chunk_bytes = min(options[:chunk_bytes] || 0x10_0000, div(limit, @chunks))
 
-    with {:ok, files} <- Disk.named(Folder.list(path), path),
-         number = Folder.next(files),
-         {:ok, file} <- Disk.create(Path.join(path, Folder.name(number))) do
+    with {:ok, file, number, files} <- begin(path) do
       {writer, head} = Writer.new(Keyword.put(options, :chunk_bytes, chunk_bytes))
 
       write(
@@ -64,6 +62,19 @@ defmodule Mcap.FileWriter.Output do
         head,
         0
       )
+    end
+  end
+
+  # Another process, such as the recorder before this one, may have begun that file meanwhile.
+  defp begin(path, tried \\ 0) do
+    with {:ok, files} <- Disk.named(Folder.list(path), path) do
+      number = Folder.next(files)
+
+      case Disk.create(Path.join(path, Folder.name(number))) do
+        {:ok, file} -> {:ok, file, number, files}
+        {:error, _taken} when number > tried -> begin(path, number)
+        error -> error
+      end
     end
   end
 
