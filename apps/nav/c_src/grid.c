@@ -261,3 +261,66 @@ size_t grid_way(const grid_map *map, const uint8_t *blocked, int need, int64_t s
         at -= DY[d] * width + DX[d];
     }
 }
+
+/* --- Costs of ways to everywhere: Dijkstra's algorithm with a bucket for each cost (Dial 1969), round and round, because no
+   step costs more than there are buckets. */
+
+#define BUCKETS (GRID_CORNER * GRID_TIMES + 1)
+#define NONE -1
+
+size_t grid_spread_scratch(int64_t width, int64_t height)
+{
+    return (size_t)(2 * width * height + BUCKETS) * sizeof(int32_t);
+}
+
+void grid_spread(const uint8_t *times, int64_t width, int64_t height, int64_t start, void *scratch, int32_t *costs)
+{
+    const int64_t cells = width * height;
+    /* Each bucket is a list, linked both ways. */
+    int32_t *first = scratch, *next = first + BUCKETS, *before = next + cells;
+
+    for (int64_t k = 0; k < BUCKETS; k++)
+        first[k] = NONE;
+    for (int64_t k = 0; k < cells; k++)
+        costs[k] = GRID_UNREACHED;
+    costs[start] = 0;
+    first[0] = (int32_t)start;
+    next[start] = before[start] = NONE;
+
+    int64_t waiting = 1;
+    for (int64_t cost = 0; waiting > 0; cost++) {
+        int32_t *bucket = first + cost % BUCKETS;
+        while (*bucket != NONE) {
+            int64_t at = *bucket, x = at % width, y = at / width;
+            *bucket = next[at];
+            if (*bucket != NONE)
+                before[*bucket] = NONE;
+            waiting--;
+            for (int d = 0; d < 8; d++) {
+                int64_t nx = x + DX[d], ny = y + DY[d];
+                if (nx < 0 || ny < 0 || nx >= width || ny >= height)
+                    continue;
+                int64_t to = ny * width + nx, total = cost + times[to] * (d % 2 == 1 ? GRID_CORNER : GRID_SIDE);
+                if (times[to] == 0 || (costs[to] != GRID_UNREACHED && costs[to] <= total))
+                    continue;
+                if (costs[to] == GRID_UNREACHED) {
+                    waiting++;
+                } else {
+                    if (before[to] == NONE)
+                        first[costs[to] % BUCKETS] = next[to];
+                    else
+                        next[before[to]] = next[to];
+                    if (next[to] != NONE)
+                        before[next[to]] = before[to];
+                }
+                costs[to] = (int32_t)total;
+                int32_t *list = first + total % BUCKETS;
+                next[to] = *list;
+                before[to] = NONE;
+                if (*list != NONE)
+                    before[*list] = (int32_t)to;
+                *list = (int32_t)to;
+            }
+        }
+    }
+}

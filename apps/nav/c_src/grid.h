@@ -53,4 +53,15 @@ size_t grid_way_scratch(int64_t width, int64_t height);
 size_t grid_way(const grid_map *map, const uint8_t *blocked, int need, int64_t start, int64_t goal, void *scratch,
                 uint32_t *way, size_t most);
 
+/* Steps of grid_spread to one of four neighbours, and to one of the other four; the most times as long that one is, so that
+   no cost exceeds its four bytes. */
+enum { GRID_SIDE = 2, GRID_CORNER = 3, GRID_TIMES = 8, GRID_UNREACHED = -1 };
+
+/* Bytes of scratch that grid_spread needs. */
+size_t grid_spread_scratch(int64_t width, int64_t height);
+
+/* The least costs of ways from `start` to all cells, GRID_UNREACHED where none leads. `times` has for each cell how many times
+   as long a step to it is, GRID_TIMES at most; 0: there is none. 8 neighbours, past any corner. */
+void grid_spread(const uint8_t *times, int64_t width, int64_t height, int64_t start, void *scratch, int32_t *costs);
+
 #endif

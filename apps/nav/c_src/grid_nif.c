@@ -118,11 +118,36 @@ static ERL_NIF_TERM way(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return result == 0 ? enif_make_badarg(env) : result;
 }
 
+/* spread(times, width, height, start): four bytes for each cell */
+static ERL_NIF_TERM spread(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
+{
+    ErlNifBinary times;
+    int64_t width, height;
+    unsigned start;
+    ERL_NIF_TERM result;
+
+    if (argc != 4 || !enif_inspect_binary(env, argv[0], &times) ||
+        !get_size(env, argv[1], argv[2], times.size, &width, &height) || !enif_get_uint(env, argv[3], &start) ||
+        start >= times.size)
+        return enif_make_badarg(env);
+    for (size_t k = 0; k < times.size; k++)
+        if (times.data[k] > GRID_TIMES)
+            return enif_make_badarg(env);
+    void *scratch = enif_alloc(grid_spread_scratch(width, height));
+    if (scratch == NULL)
+        return enif_make_badarg(env);
+    unsigned char *costs = enif_make_new_binary(env, times.size * sizeof(int32_t), &result);
+    grid_spread(times.data, width, height, start, scratch, (int32_t *)costs);
+    enif_free(scratch);
+    return result;
+}
+
 static ErlNifFunc functions[] = {
     {"loaded?", 0, loaded, 0},
     {"clearance", 5, clearance, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"overlay", 8, overlay, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"way", 7, way, ERL_NIF_DIRTY_JOB_CPU_BOUND},
+    {"spread", 4, spread, ERL_NIF_DIRTY_JOB_CPU_BOUND},
 };
 
 ERL_NIF_INIT(Elixir.Nav.Grid.Native, functions, NULL, NULL, NULL, NULL)

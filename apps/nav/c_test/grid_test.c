@@ -99,6 +99,37 @@ static int64_t cheapest(const grid_map *map, const uint8_t *blocked, int need, i
     return found;
 }
 
+/* The costs of all ways: relaxed until nothing changes. */
+static void check_spread(const uint8_t *times, int64_t width, int64_t height, int64_t start)
+{
+    int64_t cells = width * height;
+    int32_t *costs = exactly((size_t)cells * sizeof *costs), *expected = exactly((size_t)cells * sizeof *expected);
+    void *scratch = exactly(grid_spread_scratch(width, height));
+
+    grid_spread(times, width, height, start, scratch, costs);
+    for (int64_t k = 0; k < cells; k++)
+        expected[k] = k == start ? 0 : GRID_UNREACHED;
+    for (int changed = 1; changed;) {
+        changed = 0;
+        for (int64_t at = 0; at < cells; at++)
+            for (int d = 0; expected[at] >= 0 && d < 9; d++) {
+                int dx = d % 3 - 1, dy = d / 3 - 1;
+                int64_t x = at % width + dx, y = at / width + dy, to = y * width + x;
+                if ((dx == 0 && dy == 0) || x < 0 || y < 0 || x >= width || y >= height || times[to] == 0)
+                    continue;
+                int32_t total = expected[at] + times[to] * (dx != 0 && dy != 0 ? GRID_CORNER : GRID_SIDE);
+                if (expected[to] < 0 || total < expected[to]) {
+                    expected[to] = total;
+                    changed = 1;
+                }
+            }
+    }
+    CHECK(memcmp(costs, expected, (size_t)cells * sizeof *costs) == 0);
+    free(scratch);
+    free(costs);
+    free(expected);
+}
+
 int main(void)
 {
     int ways = 0, none = 0;
@@ -134,6 +165,12 @@ int main(void)
         }
         free(over);
         free(both);
+
+        uint8_t *times = exactly((size_t)cells);
+        for (int64_t k = 0; k < cells; k++)
+            times[k] = walls[k] ? 0 : (uint8_t)(1 + draw(GRID_TIMES));
+        check_spread(times, width, height, draw((uint32_t)cells));
+        free(times);
 
         grid_disc discs[3];
         size_t count = draw(4);

@@ -147,9 +147,10 @@ defmodule Console.Report do
         do: " #{Enum.map_join(robots, ", ", & &1.name)}: #{says}."
   end
 
-  defp seen(%{seen: %{area_m2: area_m2, share: share}}) do
+  defp seen(%{seen: %{area_m2: area_m2, share: share, walls: walls}}) do
     " Seen: #{Format.decimals(share * area_m2, 0)} of the #{Format.decimals(area_m2, 0)} m² " <>
-      "that a robot can come to (#{Format.decimals(100 * share, 1)} %)."
+      "that a robot can come to (#{Format.decimals(100 * share, 1)} %). " <>
+      "Of the walls on the map #{Format.decimals(100 * walls, 0)} % are within 0.2 m of true ones."
   end
 
   defp seen(_without_a_map), do: ""

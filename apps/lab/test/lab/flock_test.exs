@@ -103,6 +103,29 @@ defmodule Lab.FlockTest do
 
   defp mean(points, of), do: Enum.sum(Enum.map(points, of)) / length(points)
 
+  @tag :slow
+  test "robots of several rooms come together through doors, and go on through doors" do
+    course = [{-5.6, -0.1}, {5.5, -0.1}]
+
+    trial =
+      trial(6,
+        map: "rooms:91",
+        seed: 901,
+        plan: :known,
+        duration_s: 240,
+        mission: {:flock, course: course}
+      )
+
+    trial =
+      Enum.reduce_while(1..2_400, trial, fn _n, trial ->
+        trial = Trial.step(trial)
+        {if(Trial.done?(trial), do: :halt, else: :cont), trial}
+      end)
+
+    assert Trial.formed?(trial)
+    assert Trial.result(trial).collisions == 0
+  end
+
   test "a robot that dies does not stop the others" do
     trial(6, seed: 4, kills: [{:mag2, 30}], mission: {:flock, course: [{0.0, 0.0}, {3.0, 0.0}]})
     |> judge(150)

@@ -61,19 +61,19 @@ defmodule Missions.Explore do
                 doubts?: false,
                 done?: false,
                 unknown: 1.0,
+                good: nil,
                 told?: false,
                 why: nil,
                 started?: false
               ]
 
   @typedoc """
-  `target` is the frontier to which it goes and `ahead` the point of the way there for which it goes now, by goal number
+  `target` is the frontier to which it goes, `ahead` the point of the way there for which it goes now, by goal number
   `goal`. `still` is where it was when it last had moved, and since when; `aside` are places that it gave up, and until
-  when; `unknown` is the share of the edge of what was seen along which nothing is known
-  (`Nav.Frontiers.unknown/1`), 1.0 while there are frontiers; `looked` are places where it has looked at a wall
-  of few echoes, to one of which it goes if `doubts?`; `looked` are walls of few echoes at which it has looked, `doubts?`
-  that it goes to one; `told?` that it has said that all is explored. `peers` are what others told last: when, to where they
-  go, and how far that is.
+  when; `unknown` is the share of the edge of what was seen along which nothing is known (`Nav.Frontiers.unknown/1`), 1.0 while
+  there are frontiers; `good` says how good its map is, once it is done; `looked` are walls of few echoes at which it has looked,
+  `doubts?` that it goes to one; `told?` that it has said that all is explored. `peers` are what others told last: when, to where
+  they go, and how far that is.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -93,6 +93,7 @@ defmodule Missions.Explore do
           doubts?: boolean(),
           done?: boolean(),
           unknown: float(),
+          good: String.t() | nil,
           told?: boolean(),
           why: String.t() | nil,
           started?: boolean()
@@ -220,13 +221,14 @@ defmodule Missions.Explore do
     done? = field != nil and open == [] and now_ms - mission.since_ms >= @first_ms
     first? = Enum.all?(peers, fn {id, _goal} -> mission.me < id end)
 
-    mission = %{mission | unknown: unknown, doubts?: doubts?}
+    good = if done?, do: SharedMap.good(mission.map)
+    mission = %{mission | unknown: unknown, good: good, doubts?: doubts?}
 
     stages =
       if done? and not mission.told? and first?,
         do: [
           {:stage, :explored,
-           %{says: "says that #{area(mission)} are explored; #{left(mission)}"}}
+           %{says: "says that #{area(mission)} are explored; #{left(mission)}#{mission.good}"}}
         ],
         else: []
 
@@ -315,14 +317,13 @@ defmodule Missions.Explore do
   end
 
   defp says(%{target: nil, done?: true} = mission),
-    do: "#{area(mission)} explored, #{left(mission)}"
+    do: "#{area(mission)} explored, #{left(mission)}#{mission.good}"
 
   defp says(%{target: nil} = mission), do: "#{area(mission)} explored, looks for a frontier"
 
   defp says(%{target: %{far: far}} = mission),
     do: "#{area(mission)} explored, going to a frontier #{Float.round(far, 1)} m away"
 
-  # What it did not get to may be behind a door, or in a place without room for it.
   defp left(%{aside: aside, now_ms: now_ms, unknown: unknown} = mission) do
     frontiers =
       case Enum.count(aside, fn {_place, until_ms} -> until_ms > now_ms end) do

@@ -5,7 +5,8 @@ defmodule Missions.Flock do
 
   Each tick a robot takes its acceleration from its neighbours, from the echoes of its sonars that no robot explains, and
   from the present point of the course (`Missions.Flock.Field`), makes its velocity of it (`.Motion`), and drives with that
-  (`Robot.Behaviour.Velocity`).
+  (`Robot.Behaviour.Velocity`). Where a wall that it knows stands between it and the point, it goes there by its own way
+  (`Robot.Behaviour.Goto`), until it sees the point.
 
   How far the flock has come is a number, its leg: 0 until all members that a robot hears hang together
   (`Missions.Flock.Members`), then k on the way to point k. One that sees a leg done counts on and tells the others, which
@@ -15,7 +16,7 @@ defmodule Missions.Flock do
   hangs together. Options: `Missions.Flock.Options`.
   """
   alias Hal.Pose
-  alias Missions.Flock.{Field, Members, Motion, Options}
+  alias Missions.Flock.{Apart, Field, Members, Motion, Options, Sight}
 
   @behaviour Robot.Mission
 
@@ -25,7 +26,7 @@ defmodule Missions.Flock do
   # The flock is at a point when its middle is so near (metres), and hangs together or not is asked so often.
   @there 0.5
   @look_ms 500
-  # Metres before the point at which it slows down.
+  # Metres from a point at which it slows down.
   @slow 1.0
   # The flock slows down when it does not hang together within this many spacings, and waits when not within its reach.
   @close 1.2
@@ -34,6 +35,8 @@ defmodule Missions.Flock do
   @later_ms 2_000
   # A robot that has just begun has not heard all members yet.
   @first_ms 5_000
+  # What keeps it from coming together or to the point is looked for so often.
+  @why_ms 5_000
 
   @kept [:me, :spacing, :speed, :course, :plan]
   @enforce_keys @kept
@@ -51,14 +54,21 @@ defmodule Missions.Flock do
                 told: nil,
                 middle: nil,
                 near: 0,
+                stood: %{},
+                why: nil,
+                why_ms: nil,
+                to: nil,
+                go: 0,
                 velocity: nil,
                 started?: false
               ]
 
   @typedoc """
-  `plan` is the course in 28 bits, so that only robots with the same one are a flock; `leg` is how far it has come,
-  `done_ms` since when this leg seems done; `pace` is the share of the speed with which the flock goes on, `middle` that of
-  the members, `near` the number of the robot's neighbours, `velocity` what it drives with.
+  `plan` is the course in 28 bits, so that only robots with the same one are a flock; `leg` is how far it has come, `done_ms` since
+  when this leg seems done; `pace` is the share of the speed with which the flock goes on, `middle` that of the members, `near` the
+  number of the robot's neighbours, `velocity` what it drives with. `stood` is where members stand, `why` what keeps the flock from
+  coming together or to its point, and `to` where it goes for that by its own way, `nil` if none leads there, as found at `why_ms`;
+  `go` numbers the goals of its own way.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -78,6 +88,11 @@ defmodule Missions.Flock do
           told: non_neg_integer() | nil,
           middle: Pose.point() | nil,
           near: non_neg_integer(),
+          stood: Apart.stood(),
+          why: String.t() | nil,
+          why_ms: integer() | nil,
+          to: Pose.point() | nil,
+          go: non_neg_integer(),
           velocity: Field.vector() | nil,
           started?: boolean()
         }
@@ -126,6 +141,10 @@ defmodule Missions.Flock do
       when now_ms != nil,
       do: result(hear(mission, from, Map.new(body)), [])
 
+  # What stood in its way may be gone; it tries again.
+  def handle({:outcome, {:way, go}, _outcome}, %{go: go} = mission),
+    do: result(%{mission | go: go + 1}, [])
+
   def handle({:tick, %{pose: nil}}, mission), do: result(mission, [])
 
   def handle({:tick, percept}, %{started?: true} = mission) do
@@ -141,8 +160,7 @@ defmodule Missions.Flock do
     agents = Members.agents(mission.heard, percept)
     {mission, stages} = mission |> look(agents, percept) |> count_on()
     {mission, told} = tell(mission)
-    {velocity, mission} = velocity(mission, agents, percept)
-    goal = {:goal, :flock, {Robot.Behaviour.Velocity, velocity: velocity}}
+    {goal, mission} = drive(mission, agents, percept)
     result(mission, stages ++ told ++ [goal, {:look, 0.0}, {:claim, claim(mission)}])
   end
 
@@ -164,8 +182,9 @@ defmodule Missions.Flock do
   defp hear(mission, _from, _of_others), do: mission
 
   defp last(mission), do: map_size(mission.course) + 1
+  defp there?(mission), do: mission.leg == last(mission) and mission.together?
 
-  defp on_leg(mission, leg), do: %{mission | leg: leg, done_ms: nil}
+  defp on_leg(mission, leg), do: %{mission | leg: leg, done_ms: nil, to: nil, why_ms: nil}
 
   defp point(%{course: course}) when course == %{}, do: nil
   defp point(mission), do: mission.course[mission.leg |> max(1) |> min(map_size(mission.course))]
@@ -175,31 +194,50 @@ defmodule Missions.Flock do
        when looked_ms != nil and now_ms - looked_ms < @look_ms,
        do: mission
 
-  defp look(mission, agents, percept) do
-    points = [Pose.point(percept.pose) | Enum.map(agents, & &1.at)]
-    together? = Members.together?(points, Field.reach(mission.spacing))
-    close? = together? and Members.together?(points, @close * mission.spacing)
+  defp look(%{together?: before, now_ms: now_ms} = mission, agents, percept) do
+    members = [{mission.me, Pose.point(percept.pose)} | Enum.map(agents, &{&1.id, &1.at})]
+    middle = Members.middle(members)
+    groups = Members.groups(members, Field.reach(mission.spacing))
+    together? = length(groups) == 1
+    close? = together? and length(Members.groups(members, @close * mission.spacing)) == 1
 
     mission = %{
       mission
-      | looked_ms: mission.now_ms,
+      | looked_ms: now_ms,
         together?: together?,
-        pace: pace(together?, close?),
-        middle: middle(points)
+        middle: middle,
+        stood: Apart.stood(mission.stood, [{nil, middle} | members], now_ms)
     }
 
-    %{mission | done_ms: if(done?(mission), do: mission.done_ms || mission.now_ms)}
+    waits? = not together? and waits?(mission, groups, percept)
+    mission = why(%{mission | pace: pace(together?, close?, waits?)}, before, groups, percept)
+    %{mission | done_ms: if(done?(mission), do: mission.done_ms || now_ms)}
   end
 
-  defp pace(_together?, true), do: 1.0
-  defp pace(true, false), do: 0.5
-  defp pace(false, false), do: 0.0
+  # The group with the member that is nearest to the point waits for the others that it sees, which go on. Those behind walls come
+  # by other ways, and wait at the point.
+  defp waits?(mission, groups, percept) do
+    point = point(mission) || mission.middle
+    first = groups |> Enum.concat() |> Enum.min_by(fn {_id, at} -> Pose.distance(at, point) end)
+    {[own], others} = Enum.split_with(groups, &(first in &1))
+    List.keymember?(own, mission.me, 0) and Sight.any?(percept.grid, own, Enum.concat(others))
+  end
 
-  defp middle(points) do
-    count = length(points)
+  defp pace(_together?, _close?, true), do: 0.0
+  defp pace(true, false, false), do: 0.5
+  defp pace(_together?, _close?, false), do: 1.0
 
-    {points |> Enum.map(&elem(&1, 0)) |> Enum.sum() |> Kernel./(count),
-     points |> Enum.map(&elem(&1, 1)) |> Enum.sum() |> Kernel./(count)}
+  defp why(%{why_ms: at_ms, now_ms: now_ms, together?: same?} = mission, same?, _groups, _percept)
+       when at_ms != nil and now_ms - at_ms < @why_ms,
+       do: mission
+
+  defp why(%{now_ms: now_ms} = mission, _before, groups, percept) do
+    words = if not there?(mission), do: Apart.words(groups, mission.stood, now_ms, percept)
+
+    case Sight.place(percept, point(mission)) do
+      {:ok, place} -> %{mission | why: words, why_ms: now_ms, to: place}
+      {:error, no_way} -> %{mission | why: no_way, why_ms: now_ms, to: nil}
+    end
   end
 
   defp done?(%{leg: 0} = mission),
@@ -207,8 +245,13 @@ defmodule Missions.Flock do
 
   defp done?(mission), do: mission.leg < last(mission) and near?(mission, point(mission))
 
+  # Where walls leave no room for the flock all about the point, it is there when it has come to rest with the point among it.
   defp near?(_mission, nil), do: true
-  defp near?(%{middle: middle}, point), do: Pose.distance(middle, point) < @there
+
+  defp near?(%{middle: middle} = mission, point) do
+    Pose.distance(middle, point) < @there or
+      (mission.together? and Apart.rest?(mission.stood, point, mission.spacing, mission.now_ms))
+  end
 
   defp count_on(%{done_ms: nil} = mission), do: {mission, []}
 
@@ -243,23 +286,41 @@ defmodule Missions.Flock do
        else: {mission, []}
   end
 
+  # By the rules of the flock where these lead it to the point; else by its own way, if one leads there.
+  defp drive(mission, agents, percept) do
+    waits? = there?(mission) or (mission.leg > 0 and mission.pace == 0.0)
+
+    if mission.to == nil or waits? or Sight.straight?(percept, point(mission), mission.spacing) do
+      {velocity, mission} = velocity(mission, agents, percept)
+      {{:goal, :flock, {Robot.Behaviour.Velocity, velocity: velocity}}, mission}
+    else
+      {x, y} = mission.to
+      pace = if mission.leg == 0, do: 1.0, else: mission.pace
+      way = [x: x, y: y, tolerance: @there, speed: pace * mission.speed]
+      {{:goal, {:way, mission.go}, {Robot.Behaviour.Goto, way}}, %{mission | velocity: nil}}
+    end
+  end
+
   defp velocity(mission, agents, percept) do
     at = Pose.point(percept.pose)
     reach = Field.reach(mission.spacing)
     near = Enum.filter(agents, &(Pose.distance(at, &1.at) < reach))
-    rules = %{spacing: mission.spacing, top: mission.speed, guide: guide(mission, at)}
+    rules = %{spacing: mission.spacing, top: mission.speed, guide: guide(mission, at, percept)}
     velocity = Motion.velocity(mission.velocity, percept, near, rules)
     {velocity, %{mission | near: length(near), velocity: velocity}}
   end
 
-  # Each by itself to the first point; then all about the middle of the flock, which goes to the next.
-  defp guide(%{leg: 0} = mission, at),
+  # Each by itself to the first point; then all about the middle of the flock, which goes to the next. Behind a wall the middle
+  # counts for nothing.
+  defp guide(%{leg: 0} = mission, at, _percept),
     do: {point(mission) || at, {0.0, 0.0}, mission.speed, radius(mission)}
 
-  defp guide(%{middle: middle} = mission, _at) do
-    velocity = Field.toward(middle, point(mission) || middle, mission.pace * mission.speed, @slow)
-
-    {middle, velocity, @cohere * mission.speed, radius(mission)}
+  defp guide(%{middle: middle} = mission, at, percept) do
+    point = point(mission) || middle
+    from = if mission.together? and Sight.sees?(percept, middle, point), do: middle, else: at
+    centre = if Sight.sees?(percept, at, middle), do: middle, else: at
+    velocity = Field.toward(from, point, mission.pace * mission.speed, @slow)
+    {centre, velocity, @cohere * mission.speed, radius(mission)}
   end
 
   # About that of the flock, in metres.
@@ -269,7 +330,7 @@ defmodule Missions.Flock do
     %{
       phase: phase(mission),
       standing: false,
-      formed: phase(mission) == :arrived and mission.together?,
+      formed: there?(mission),
       says: says(mission)
     }
   end
@@ -282,8 +343,7 @@ defmodule Missions.Flock do
         :arrived -> "arrived"
       end
 
-    if mission.together?,
-      do: "#{way}, #{many(mission)} together",
-      else: "#{way}, #{many(mission)}, not together"
+    together = if mission.together?, do: " together", else: ", not together"
+    way <> ", " <> many(mission) <> together <> if(mission.why, do: ": #{mission.why}", else: "")
   end
 end

@@ -177,7 +177,7 @@ defmodule Missions.ExploreTest do
     assert %{formed: false, phase: :explored} = runner.claim
 
     assert runner.claim.says =~
-             ~r/; it has no room to get to the \d\d % of its edge that are unknown$/
+             ~r/; it has no room to get to the \d\d % of its edge that are unknown; later looks confirmed \d+ % of the walls that it heard$/
 
     assert [%{says: "says that 1 m² are explored" <> _}] =
              for({:stage, :explored, facts} <- effects, do: facts)

@@ -2,9 +2,10 @@ defmodule Missions.FlockTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Options, Pose, Profile, Twist}
   alias Missions.Flock
-  alias Missions.Flock.{Field, Members}
+  alias Missions.Flock.{Apart, Field, Members}
   alias Robot.Mission.{Letter, Runner}
   alias Robot.Percept
+  doctest Apart
   doctest Field
   doctest Members
 
@@ -62,7 +63,7 @@ defmodule Missions.FlockTest do
     runner
   end
 
-  defp tick(runner, at_ms, peers \\ %{}, pose \\ Pose.new(0, 0)) do
+  defp tick(runner, at_ms, peers \\ %{}, pose \\ Pose.new(0, 0), grid \\ nil) do
     still = %Odometry{pose: pose, twist: Twist.zero()}
 
     Runner.handle(
@@ -74,7 +75,8 @@ defmodule Missions.FlockTest do
          profile: Profile.magellan(),
          pose: pose,
          odometry: still,
-         peers: peers
+         peers: peers,
+         grid: grid
        }}
     )
   end
@@ -177,7 +179,77 @@ defmodule Missions.FlockTest do
     assert {"on the way to point 2 of 2, 3 robots together", 1.0, {vx, _vy}} = go.(-1.2)
     assert vx > 0.01
     assert {"on the way to point 2 of 2, 3 robots together", 0.5, _slower} = go.(-1.5)
-    assert {"on the way to point 2 of 2, 3 robots, not together", +0.0, _waits} = go.(-2.0)
+
+    assert {"on the way to point 2 of 2, 3 robots, not together: mag3 is 2.0 m from mag1", +0.0,
+            _waits} = go.(-2.0)
+  end
+
+  # 8 x 4 m with a wall across the middle, whose door has so many cells of 10 cm; its lower left corner is at -4, -2.
+  defp hall(door) do
+    cells =
+      for j <- 0..39, i <- 0..79, into: <<>> do
+        <<if(i in 39..40 and j not in Enum.take(28..38, door), do: 1, else: 0)>>
+      end
+
+    Nav.Grid.new(cells, {80, 40}, 0.1, {-4.0, -2.0})
+  end
+
+  test "behind a wall it goes to the point by its own way, and by the rules of the flock once it sees it" do
+    runner = flock(course: [{2, 0}])
+
+    go = fn pose ->
+      runner |> tick(0, %{}, pose, hall(11)) |> elem(1) |> List.keyfind(:goal, 0)
+    end
+
+    assert {:goal, {:way, 0}, {Robot.Behaviour.Goto, way}} = go.(Pose.new(-2, 0))
+    assert {way[:x], way[:y], way[:speed]} == {2, 0, 0.3}
+    assert {:goal, :flock, {Robot.Behaviour.Velocity, velocity: _}} = go.(Pose.new(1, 0))
+  end
+
+  test "a way that ended before the point is tried again" do
+    {runner, _effects} = tick(flock(course: [{2, 0}]), 0, %{}, Pose.new(-2, 0), hall(11))
+    {runner, _effects} = Runner.handle(runner, {:outcome, {:way, 0}, 2})
+    {_runner, effects} = tick(runner, 100, %{}, Pose.new(-2, 0), hall(11))
+    assert {:goal, {:way, 1}, {Robot.Behaviour.Goto, _}} = List.keyfind(effects, :goal, 0)
+  end
+
+  test "it says where no way leads, and what lies between members that are apart" do
+    says = fn course, door, peers ->
+      {runner, _effects} = tick(flock(course: course), 0, %{}, Pose.new(-2, 0), hall(door))
+      runner = Enum.reduce(Map.keys(peers), runner, &hear(&2, &1, letter(course: course)))
+      {runner, _effects} = tick(runner, 500, peers, Pose.new(-2, 0), hall(door))
+      runner.claim.says
+    end
+
+    assert says.([{2, 0}], 0, %{}) ==
+             "gathers, 1 robot together: no way to 2.0,0.0: no way leads there"
+
+    assert says.([{0, 0}], 11, %{}) ==
+             "gathers, 1 robot together: no way to 0.0,0.0: there is a wall"
+
+    peers = %{mag2: peer(2.0, 0.0, 500)}
+    apart = "gathers, 2 robots, not together: mag2 is 4.0 m from mag1"
+    assert says.([{-2, 0}], 11, peers) == apart <> ", a wall between them"
+    assert says.([{-2, 0}], 0, peers) == apart <> ", no way between them"
+  end
+
+  test "those that are behind go on while the first wait, and one that stands is told of" do
+    options = [course: [{0, 0}, {9, 0}]]
+    told = letter(options, leg: 2)
+    {runner, _effects} = tick(flock(options), 0)
+    runner = runner |> hear(:mag2, told)
+
+    go = fn runner, at_ms ->
+      runner = hear(runner, :mag2, told)
+      elem(tick(runner, at_ms, %{mag2: peer(4.0, 0.0, at_ms)}), 0)
+    end
+
+    behind = go.(runner, 600)
+    assert behind.mission.pace == 1.0
+    runner = Enum.reduce(1..24, behind, &go.(&2, 600 + 500 * &1))
+
+    assert runner.claim.says =~
+             ~r/not together: mag2 is 4.0 m from mag1, and has stood for 1\d s$/
   end
 
   test "a member that fell silent is waited for no longer" do

@@ -29,6 +29,7 @@ defmodule Nav.Frontiers do
   @narrow 0.08
   @times 5
   @some ceil(@narrow / 0.02)
+  # Steps of `Nav.Grid.costs/3`.
   @neighbours [
     {-1, -1, 3},
     {0, -1, 2},
@@ -47,8 +48,8 @@ defmodule Nav.Frontiers do
   @type frontier :: %{at: Pose.point(), far: float(), size: pos_integer(), square: integer()}
 
   @typedoc """
-  `squares` has a byte for each: 0 unknown, 1 open, 2 wall, 3 narrow, 4 free without room for the robot; `costs` are ways from the robot in steps of 10 cm, by the
-  number of the square.
+  `squares` has a byte for each: 0 unknown, 1 open, 2 wall, 3 narrow, 4 free without room for the robot; `costs` are ways from the robot in steps of 10 cm
+  (`Nav.Grid.costs/3`), by the number of the square.
   """
   @type t :: %__MODULE__{
           squares: binary(),
@@ -58,7 +59,7 @@ defmodule Nav.Frontiers do
           low: float(),
           grid: Grid.t(),
           room: float(),
-          costs: %{non_neg_integer() => non_neg_integer()},
+          costs: binary(),
           found: [frontier()]
         }
 
@@ -81,12 +82,13 @@ defmodule Nav.Frontiers do
       low: raster.low * cell,
       grid: grid,
       room: room,
-      costs: %{},
+      costs: <<>>,
       found: []
     }
 
     with start when start != nil <- start(field, from) do
-      field = %{field | costs: spread(field, %{start => 0}, %{0 => [start]}, 0)}
+      times = for <<kind <- field.squares>>, into: <<>>, do: <<times(kind)>>
+      field = %{field | costs: Grid.costs(times, {field.width, field.height}, start)}
       %{field | found: found(field, [1])}
     end
   end
@@ -145,39 +147,14 @@ defmodule Nav.Frontiers do
     with {_square, number} <- Enum.min(near, fn -> nil end), do: number
   end
 
-  # Dijkstra's algorithm with a bucket for each cost.
-  defp spread(_field, costs, buckets, _cost) when buckets == %{}, do: costs
+  defp times(1), do: 1
+  defp times(3), do: @times
+  defp times(_no_room), do: 0
 
-  defp spread(field, costs, buckets, cost) do
-    {now, buckets} = Map.pop(buckets, cost, [])
-
-    {costs, buckets} =
-      for number <- now, costs[number] == cost, reduce: {costs, buckets} do
-        state -> step(field, number, cost, state)
-      end
-
-    spread(field, costs, buckets, cost + 1)
+  defp cost(%{costs: costs}, number) do
+    <<cost::32-signed-native>> = binary_part(costs, 4 * number, 4)
+    cost
   end
-
-  defp step(field, number, cost, state) do
-    {i, j} = {rem(number, field.width), div(number, field.width)}
-
-    for {di, dj, far} <- @neighbours,
-        kind = at(field, i + di, j + dj),
-        kind in [1, 3],
-        reduce: state do
-      {costs, buckets} ->
-        next = (j + dj) * field.width + i + di
-        way = cost + step(kind, far)
-
-        if way < Map.get(costs, next, :infinity),
-          do: {Map.put(costs, next, way), Map.update(buckets, way, [next], &[next | &1])},
-          else: {costs, buckets}
-    end
-  end
-
-  defp step(1, far), do: far
-  defp step(3, far), do: @times * far
 
   @doc """
   The share of the edge of what is known to be free, along which nothing is known: 0 where walls are all round, 1 where none
@@ -209,12 +186,7 @@ defmodule Nav.Frontiers do
   def narrow(field), do: found(field, [1, 3])
 
   defp found(field, kinds) do
-    edge =
-      for {number, _cost} <- field.costs,
-          :binary.at(field.squares, number) in kinds,
-          edge?(field, number),
-          into: MapSet.new(),
-          do: number
+    edge = field.squares |> edge(field.costs, 0, field, kinds) |> MapSet.new()
 
     for {group, k} <- edge |> groups(field) |> Enum.with_index(),
         number <- group do
@@ -224,6 +196,15 @@ defmodule Nav.Frontiers do
     |> Enum.map(fn {_part, numbers} -> frontier(field, numbers) end)
     |> Enum.sort_by(&{&1.far, &1.square})
   end
+
+  # The squares of these kinds, to which a way leads, beside what is unknown.
+  defp edge(<<kind, squares::binary>>, <<cost::32-signed-native, costs::binary>>, n, field, kinds) do
+    if cost >= 0 and kind in kinds and edge?(field, n),
+      do: [n | edge(squares, costs, n + 1, field, kinds)],
+      else: edge(squares, costs, n + 1, field, kinds)
+  end
+
+  defp edge(<<>>, <<>>, _number, _field, _kinds), do: []
 
   defp edge?(field, number) do
     {i, j} = {rem(number, field.width), div(number, field.width)}
@@ -258,11 +239,11 @@ defmodule Nav.Frontiers do
   end
 
   defp frontier(field, numbers) do
-    number = Enum.min_by(numbers, &{field.costs[&1], &1})
+    number = Enum.min_by(numbers, &{cost(field, &1), &1})
 
     %{
       at: centre(field, number),
-      far: field.costs[number] * @square / 2,
+      far: cost(field, number) * @square / 2,
       size: length(numbers),
       square: number
     }
@@ -294,8 +275,8 @@ defmodule Nav.Frontiers do
   defp passes?(field, from, to), do: Grid.passes?(field.grid, from, to, field.room)
 
   # The squares of the way, that of the robot first.
-  defp back(%{costs: costs, width: width} = field, number, way) do
-    cost = costs[number]
+  defp back(%{width: width} = field, number, way) do
+    cost = cost(field, number)
 
     if cost == 0 do
       [number | way]
@@ -307,8 +288,9 @@ defmodule Nav.Frontiers do
         Enum.find_value(@neighbours, fn {di, dj, far} ->
           next = (j + dj) * width + i + di
 
-          if at(field, i + di, j + dj) in [1, 3] and costs[next] == cost - step(kind, far),
-            do: next
+          if at(field, i + di, j + dj) in [1, 3] and
+               cost(field, next) == cost - times(kind) * far,
+             do: next
         end)
 
       back(field, before, [number | way])

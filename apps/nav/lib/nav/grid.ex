@@ -204,6 +204,20 @@ defmodule Nav.Grid do
     end
   end
 
+  @doc """
+  The costs of the cheapest ways from a cell to all others of a grid of this size, four bytes each (signed, native), -1 where none
+  leads: 2 for a step to a side, 3 for one to a corner, each as many times as `times` has for the cell that it leads to, a byte
+  each, 8 at most; 0 means that none does.
+
+      iex> costs = Nav.Grid.costs(<<1, 5, 0, 1, 1, 1>>, {3, 2}, 0)
+      iex> for <<cost::32-signed-native <- costs>>, do: cost
+      [0, 10, -1, 2, 3, 5]
+  """
+  @spec costs(times :: binary(), {pos_integer(), pos_integer()}, start :: non_neg_integer()) ::
+          binary()
+  def costs(times, {width, height}, start) when byte_size(times) == width * height,
+    do: kernel().spread(times, width, height, start)
+
   @doc "The units of clearance that a disc of this radius needs, for the kernels."
   @spec needed(radius :: float()) :: pos_integer()
   def needed(radius), do: radius |> Kernel./(@unit) |> ceil() |> max(1) |> min(@units)

@@ -167,6 +167,21 @@ defmodule Nav.Survey do
 
   defp doubted(<<>>, <<>>, done), do: done
 
+  @doc """
+  The number of all cells of wall, and of those that later looks confirmed: with the most evidence there is, twice what makes a
+  wall.
+
+      iex> survey = %Nav.Survey{tiles: %{{0, 0} => <<-8::signed, 30, 60, 59, 0::2016>>}}
+      iex> Nav.Survey.confirmed(survey)
+      {1, 3}
+  """
+  @spec confirmed(t()) :: {confirmed :: non_neg_integer(), walls :: non_neg_integer()}
+  def confirmed(%__MODULE__{tiles: tiles}) do
+    for {_at, cells} <- tiles, <<evidence::signed <- cells>>, evidence >= @wall, reduce: {0, 0} do
+      {sure, walls} -> {if(evidence >= @sure, do: sure + 1, else: sure), walls + 1}
+    end
+  end
+
   defp state(evidence) when evidence >= @wall, do: <<2>>
   defp state(evidence) when evidence <= @free, do: <<1>>
   defp state(_evidence), do: <<0>>

@@ -47,6 +47,23 @@ defmodule Nav.GridTest do
     end
   end
 
+  test "the costs of ways in C are those of the reference" do
+    for _ <- 1..150 do
+      {walls, width, height} = cells()
+      times = for <<wall <- walls>>, into: <<>>, do: <<(1 - wall) * :rand.uniform(8)>>
+      arguments = [times, width, height, :rand.uniform(width * height) - 1]
+      assert apply(Native, :spread, arguments) == apply(Reference, :spread, arguments)
+    end
+
+    for {times, width, start} <- [
+          {<<1, 1>>, 2, 2},
+          {<<1, 1>>, 1, 0},
+          {<<1, 9>>, 2, 0},
+          {<<>>, 0, 0}
+        ],
+        do: assert_raise(ArgumentError, fn -> Native.spread(times, width, 1, start) end)
+  end
+
   test "a window laid over a grid in C is that of the reference, also where it juts out" do
     for _ <- 1..150 do
       [{over, wide, high}, {clear, width, height}] =

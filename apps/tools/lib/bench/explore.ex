@@ -6,18 +6,18 @@ defmodule Bench.Explore do
   The area, and what of it is seen: `Lab.Trial.Coverage`.
   """
   alias Hal.Pose
-  alias Nav.Grid
   alias Lab.{Run, Trial}
   alias Lab.Trial.Coverage
   alias Swarm.Member
 
   @share 0.95
-  # A wall on the map that is so near to a true one (metres) is one.
+  # A wall on the map that is so near to a true one (metres) is one; one that is farther away than this is wrong.
   @near_m 0.3
+  @wrong_m 0.2
 
   @typedoc """
   When 95 % of the area were seen, and when all robots said that they are ready (seconds, `nil` for never); the share that
-  was seen in the end; how many of the map's cells of wall are within 0.3 m of a true wall; how far the worst robot was
+  was seen in the end; how many of the map's cells of wall are within 0.3 m of a true wall, and how many farther than 0.2 m from any; how far the worst robot was
   from where it believed to be at the end.
   """
   @type measured :: %{
@@ -29,6 +29,7 @@ defmodule Bench.Explore do
           ready_s: float() | nil,
           share: float(),
           walls: float(),
+          wrong: float(),
           off_m: float(),
           collisions: non_neg_integer()
         }
@@ -85,20 +86,10 @@ defmodule Bench.Explore do
       seen_s: seen.seen_s,
       ready_s: if(ready?, do: trial.at_ms / 1_000),
       share: seen.share,
-      walls: walls(map, plan),
+      walls: Coverage.walls(map, plan, @near_m),
+      wrong: 1.0 - Coverage.walls(map, plan, @wrong_m),
       off_m: Enum.max(off),
       collisions: Trial.result(trial).collisions
     }
-  end
-
-  defp walls(map, plan) do
-    near =
-      for {2, k} <- map.cells |> :binary.bin_to_list() |> Enum.with_index() do
-        x = (map.left + rem(k, map.width) + 0.5) * map.cell
-        y = (map.low + div(k, map.width) + 0.5) * map.cell
-        Grid.clearance(plan, {x, y}) <= @near_m
-      end
-
-    Enum.count(near, & &1) / max(length(near), 1)
   end
 end

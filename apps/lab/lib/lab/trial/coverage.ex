@@ -12,6 +12,8 @@ defmodule Lab.Trial.Coverage do
   alias Swarm.Member
 
   @cell Survey.cell()
+  # A wall on the map that is so near to a true one (metres) is in its place.
+  @near_m 0.2
   @radius Hal.Profile.magellan().radius
 
   @enforce_keys [:rows, :left, :count]
@@ -94,12 +96,29 @@ defmodule Lab.Trial.Coverage do
 
   defp known(cells), do: for(<<state <- cells>>, state != 0, reduce: 0, do: (n -> n + 1))
 
-  @doc "The area of a run that began there, and the share of it that was seen; `nil` of a mission that makes no map."
-  @spec of(Trial.t(), [Pose.point()]) :: %{area_m2: float(), share: float()} | nil
+  @doc "The share of the map's cells of wall that are within so many metres of a true wall; 0.0 of a map without a wall."
+  @spec walls(MapFile.Writer.raster(), Grid.t(), near :: float()) :: float()
+  def walls(map, plan, near) do
+    true? =
+      for {2, k} <- map.cells |> :binary.bin_to_list() |> Enum.with_index() do
+        x = (map.left + rem(k, map.width) + 0.5) * map.cell
+        y = (map.low + div(k, map.width) + 0.5) * map.cell
+        Grid.clearance(plan, {x, y}) <= near
+      end
+
+    Enum.count(true?, & &1) / max(length(true?), 1)
+  end
+
+  @doc """
+  The area of a run that began there, the share of it that was seen, and that of the map's walls that are within 0.2 m of true
+  ones; `nil` of a mission that makes no map.
+  """
+  @spec of(Trial.t(), [Pose.point()]) :: %{area_m2: float(), share: float(), walls: float()} | nil
   def of(trial, starts) do
     with %{} = map <- fullest(trial) do
       area = area(trial.map, starts)
-      %{area_m2: size_m2(area), share: share(area, map)}
+      walls = walls(map, Sim.Floorplan.grid(trial.map), @near_m)
+      %{area_m2: size_m2(area), share: share(area, map), walls: walls}
     end
   end
 end

@@ -44,6 +44,14 @@ defmodule Missions.Explore.SharedMap do
   @spec area(t()) :: float()
   def area(%__MODULE__{free: free}), do: free * Survey.cell() * Survey.cell()
 
+  @doc "How good the map is by what the robot itself has heard, to be added to what it says; `nil` without a wall."
+  @spec good(t()) :: String.t() | nil
+  def good(%__MODULE__{survey: survey}) do
+    with {sure, walls} when walls > 0 <- Survey.confirmed(survey),
+         do: "; later looks confirmed #{round(100 * sure / walls)} % of the walls that it heard",
+         else: (_no_wall -> nil)
+  end
+
   @doc "The greatest distance from where a robot began at which it knows anything, metres."
   @spec far() :: float()
   def far, do: @far * @tile * Survey.cell()

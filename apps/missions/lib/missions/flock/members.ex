@@ -16,6 +16,8 @@ defmodule Missions.Flock.Members do
 
   @typedoc "When a member was last heard, by its name."
   @type t :: %{atom() => at_ms :: integer()}
+  @typedoc "A member and where it is."
+  @type member :: {atom(), Pose.point()}
   @type agent :: %{
           id: atom(),
           at: Pose.point(),
@@ -56,14 +58,37 @@ defmodule Missions.Flock.Members do
       false
   """
   @spec together?([Pose.point()], float()) :: boolean()
-  def together?([], _far), do: true
-  def together?([first | rest], far), do: spread([first], rest, far) == []
+  def together?(points, far), do: length(groups(Enum.map(points, &{nil, &1}), far)) < 2
 
-  # Those that do not hang together with the first.
-  defp spread([], rest, _far), do: rest
+  @doc """
+  The members by groups that hang together, each within `far` metres of another one of its group. The greatest group comes
+  first; of equal ones that of the first member.
 
-  defp spread([point | more], rest, far) do
-    {near, rest} = Enum.split_with(rest, &(Pose.distance(point, &1) <= far))
-    spread(near ++ more, rest, far)
+      iex> Missions.Flock.Members.groups([mag1: {0.0, 0.0}, mag2: {3.0, 0.0}, min1: {2.0, 0.0}], 1.2)
+      [[min1: {2.0, 0.0}, mag2: {3.0, 0.0}], [mag1: {0.0, 0.0}]]
+  """
+  @spec groups([member()], far :: float()) :: [[member(), ...]]
+  def groups(members, far), do: members |> split(far) |> Enum.sort_by(&(-length(&1)))
+
+  @doc "The middle of these members."
+  @spec middle([member(), ...]) :: Pose.point()
+  def middle(members) do
+    {x, y} = Enum.reduce(members, {0, 0}, fn {_id, {x, y}}, {ax, ay} -> {ax + x, ay + y} end)
+    {x / length(members), y / length(members)}
+  end
+
+  defp split([], _far), do: []
+
+  defp split([first | rest], far) do
+    {group, others} = spread([first], [], rest, far)
+    [group | split(others, far)]
+  end
+
+  # Those that hang together with the first, and the others.
+  defp spread([], group, others, _far), do: {group, others}
+
+  defp spread([{_id, at} = member | more], group, others, far) do
+    {near, others} = Enum.split_with(others, fn {_id, to} -> Pose.distance(at, to) <= far end)
+    spread(near ++ more, [member | group], others, far)
   end
 end

@@ -31,4 +31,8 @@ defmodule Nav.Grid.Native do
         ) :: [non_neg_integer()]
   def way(_clear, _width, _height, _need, _discs, _start, _goal),
     do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec spread(times :: binary(), pos_integer(), pos_integer(), start :: non_neg_integer()) ::
+          binary()
+  def spread(_times, _width, _height, _start), do: :erlang.nif_error(:nif_not_loaded)
 end

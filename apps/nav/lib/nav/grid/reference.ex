@@ -11,6 +11,8 @@ defmodule Nav.Grid.Reference do
   @weight 8
   @narrow 16
   @roomy 25
+  @side 2
+  @corner 3
 
   @doc "See `Nav.Grid.new/5`: the distance of each cell's centre to the nearest wall, in units of 2 cm."
   @spec clearance(binary(), pos_integer(), pos_integer(), float(), boolean()) :: binary()
@@ -158,5 +160,47 @@ defmodule Nav.Grid.Reference do
   defp weight(clear, need) do
     lacking = (@roomy - (clear - need)) |> max(0) |> min(@roomy)
     @weight + div(lacking * @narrow, @roomy)
+  end
+
+  @doc "See `Nav.Grid.costs/3`: Dijkstra's algorithm with a bucket for each cost."
+  @spec spread(binary(), pos_integer(), pos_integer(), non_neg_integer()) :: binary()
+  def spread(times, width, height, start) do
+    costs =
+      relax(%{times: times, width: width, height: height}, %{start => 0}, %{0 => [start]}, 0)
+
+    for cell <- 0..(width * height - 1),
+        into: <<>>,
+        do: <<Map.get(costs, cell, -1)::32-signed-native>>
+  end
+
+  defp relax(_map, costs, buckets, _cost) when buckets == %{}, do: costs
+
+  defp relax(map, costs, buckets, cost) do
+    {now, buckets} = Map.pop(buckets, cost, [])
+
+    {costs, buckets} =
+      for cell <- now,
+          costs[cell] == cost,
+          {dx, dy} <- @steps,
+          next = next(map, cell, dx, dy),
+          next != nil,
+          reduce: {costs, buckets} do
+        {costs, buckets} ->
+          side = if dx == 0 or dy == 0, do: @side, else: @corner
+          total = cost + side * :binary.at(map.times, next)
+
+          if total < Map.get(costs, next, :infinity),
+            do: {Map.put(costs, next, total), Map.update(buckets, total, [next], &[next | &1])},
+            else: {costs, buckets}
+      end
+
+    relax(map, costs, buckets, cost + 1)
+  end
+
+  defp next(%{width: width, height: height, times: times}, cell, dx, dy) do
+    {x, y} = {rem(cell, width) + dx, div(cell, width) + dy}
+
+    if x >= 0 and y >= 0 and x < width and y < height and :binary.at(times, y * width + x) > 0,
+      do: y * width + x
   end
 end

@@ -41,6 +41,7 @@ defmodule Bench.Explore.Main do
     "all say that they are ready: median (s)",
     "seen in the end: least",
     "walls that are there: median",
+    "walls farther than 0.2 m from true ones: median",
     "off its place at the end: worst (m)",
     "collisions"
   ]
@@ -69,6 +70,7 @@ defmodule Bench.Explore.Main do
       some |> Enum.map(& &1.ready_s) |> median() |> seconds(),
       percent(some |> Enum.map(& &1.share) |> Enum.min()),
       percent(some |> Enum.map(& &1.walls) |> median()),
+      percent(some |> Enum.map(& &1.wrong) |> median()),
       Format.decimals(some |> Enum.map(& &1.off_m) |> Enum.max(), 2),
       some |> Enum.map(& &1.collisions) |> Enum.sum()
     ]
