@@ -168,6 +168,14 @@ defmodule Robot.Localiser.SilhouettesTest do
     assert Silhouettes.align(unsure, [], picture, @here) == unsure
   end
 
+  test "one that is unsure by more than a metre stays where it is: any blob fits somewhere" do
+    one = Enum.take(@column, 1)
+    picture = picture(one, turned(-0.1))
+    [vague, less] = for sd <- [0.3, 0.1], do: unsure(sd)
+    assert Silhouettes.align(vague, one, picture, @here) == vague
+    assert Silhouettes.align(less, one, picture, @here) != less
+  end
+
   test "where two places fit, or none does, it stays where it is" do
     unsure = unsure(0.1)
     # Two abreast, of which it sees one: that may be either.
