@@ -272,11 +272,10 @@ defmodule Console.Picture.Floor do
       cx: x,
       cy: y,
       r: r,
-      fill: colour,
-      fill_opacity: 0.06,
+      fill: "none",
       stroke: colour,
-      stroke_width: 1,
-      stroke_dasharray: "1 3"
+      stroke_width: 1.5,
+      stroke_dasharray: "2 4"
     )
   end
 

@@ -158,6 +158,7 @@ defmodule Console.Picture.Legend do
          Svg.group([transform: "translate(0 22)"], [
            Svg.element(:rect, width: width, height: height, fill: "#FBFBF9"),
            Walls.draw(ground, whole, scale),
+           Svg.element(:rect, width: width, height: height, fill: "none", stroke: Walls.wall()),
            part(box, at),
            Enum.map(track.last.robots, &dot(&1, Floor.colours(track), at)),
            for({_x, _y} = place <- [track.last.landmark], do: mark(at.(place)))

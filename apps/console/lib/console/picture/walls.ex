@@ -23,30 +23,40 @@ defmodule Console.Picture.Walls do
     cell = max(@least, (right - left) / @most)
     columns = ceil((right - left) / cell)
 
-    runs =
+    rows =
       for row <- 0..(ceil((top - bottom) / cell) - 1)//1,
-          y = top - (row + 0.5) * cell,
-          {kind, from, count} <- runs(ground, columns, &(left + (&1 + 0.5) * cell), y),
-          do: {kind, {row, from, count}}
+          do: runs(ground, columns, &(left + (&1 + 0.5) * cell), top - (row + 0.5) * cell)
+
+    bands = bands(rows)
 
     for {kind, colour} <- [unknown: @unknown, wall: @wall] do
       Svg.group(
         [fill: colour, shape_rendering: "crispEdges"],
-        for({^kind, run} <- runs, do: rectangle(run, cell * scale))
+        for({row, high, runs} <- bands, {^kind, from, wide} <- runs) do
+          side = cell * scale
+
+          Svg.element(:rect,
+            x: from * side,
+            y: row * side,
+            width: wide * side,
+            height: high * side + 0.3
+          )
+        end
       )
     end
   end
 
-  # Cells of one row that touch become one rectangle.
-  defp rectangle({row, from, count}, side) do
-    Svg.element(:rect,
-      x: from * side,
-      y: row * side,
-      width: count * side,
-      height: side + 0.3
-    )
+  # Rows that are alike are one: `{first, count, runs}`.
+  defp bands(rows) do
+    rows
+    |> Enum.chunk_by(& &1)
+    |> Enum.map_reduce(0, fn [runs | _] = alike, row ->
+      {{row, length(alike), runs}, row + length(alike)}
+    end)
+    |> elem(0)
   end
 
+  # Cells of one row that are alike: `{kind, first, count}`.
   defp runs(ground, columns, x, y) do
     0..(columns - 1)
     |> Enum.map(&MapView.kind(ground, x.(&1), y))
