@@ -13,7 +13,7 @@ defmodule Robot.Localiser.InSight do
 
   # A line that is nearer to a wall than this (metres) does not pass it.
   @beside 0.02
-  # An uncertainty up to this (metres) counts as none.
+  # A place up to this far (metres) from the estimate counts as that.
   @sure 0.1
 
   @enforce_keys [:grid, :places]
@@ -30,7 +30,7 @@ defmodule Robot.Localiser.InSight do
   def new(grid, belief, %Pose{x: x, y: y}, sds) do
     {worst, _least, direction} = Belief.spread(belief)
     {dx, dy} = {worst * :math.cos(direction), worst * :math.sin(direction)}
-    sides = for sd <- sds, worst > @sure, k <- [sd, -sd], do: {x + k * dx, y + k * dy}
+    sides = for sd <- sds, sd * worst > @sure, k <- [sd, -sd], do: {x + k * dx, y + k * dy}
     %__MODULE__{grid: grid, places: [{x, y} | sides]}
   end
 

@@ -61,6 +61,9 @@ defmodule Robot.Localiser.InSightTest do
     beside = mark(:beside, {3.0, 1.3})
     seen? = fn sds -> InSight.seen?(InSight.new(plan(), unsure, unsure.pose, sds), beside) end
     assert for(sds <- [[1.0], [1.25, 2.5]], do: seen?.(sds)) == [false, true]
+    # What one of them does not reach, many may.
+    sure = Frame.reframe(Belief.new(Pose.new(0, 0)), {4.0, 0.0}, 0.0, 0.0004)
+    assert InSight.seen?(InSight.new(plan(), sure, sure.pose, [1.0, 12.0]), beside)
   end
 
   test "a robot at the same place, or in a wall, is an answer too" do
