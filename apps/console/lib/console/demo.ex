@@ -251,8 +251,8 @@ defmodule Console.Demo do
     formed? = Run.scene(run).formed?
     Enum.each(Report.summary(result, formed?, wall_s), &Output.line(view.output, &1))
 
-    title = Picture.title(length(options.robots), options.map, options.seed)
-    drawing = view.track && fn -> Picture.draw(view.track, title) end
+    drawing =
+      view.track && fn -> Picture.draw(view.track, Picture.title(Options.trial(options))) end
 
     written =
       with :ok <- Report.write(options, Report.json(result, wall_s), drawing, view.output),

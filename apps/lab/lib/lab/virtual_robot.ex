@@ -89,6 +89,7 @@ defmodule Lab.VirtualRobot do
            Board.fetch(board, :mission, :infinity) do
       claim = timely(state, claim, Board.now(board) - (ticked_ms || at_ms))
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
+      claim = Map.put(claim, :believed, believed(board))
       claim = if Board.latched?(board), do: Map.put(claim, :estop, callers(board)), else: claim
 
       Manual.shown(state, claim)
@@ -102,6 +103,12 @@ defmodule Lab.VirtualRobot do
   defp timely(:idle, claim, _age_ms), do: claim
 
   defp callers(board), do: board |> EStop.written() |> EStop.State.callers()
+
+  defp believed(board) do
+    with {:ok, pose, _at_ms} <- Board.fetch(board, :pose, :infinity),
+         do: pose,
+         else: (_unknown -> nil)
+  end
 
   defp uncertainty(board) do
     with {:ok, %{radius: radius}, _at_ms} <- Board.fetch(board, :uncertainty, :infinity),

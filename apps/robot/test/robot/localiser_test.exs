@@ -75,6 +75,28 @@ defmodule Robot.LocaliserTest do
     end)
   end
 
+  test "a landmark of which a wall hides the most makes a robot no less sure" do
+    truth = Pose.new(0, 0)
+    {before, localiser} = settle(Localiser.new(truth), truth, [@landmark, @leader], 50)
+    whole = blob("Y", truth, {4.0, 0.0}, 0.15)
+
+    for share <- [0.1, 0.3, 0.5] do
+      # Its area, and so its distance, is that of the part to the right.
+      left = whole.right - round(share * (whole.right - whole.left))
+      x = (left + whole.right) / 2
+      part = %{whole | left: left, x: x, distance: whole.distance / :math.sqrt(share)}
+
+      {percept, _} =
+        Enum.reduce(51..90, {nil, localiser}, fn k, {_, localiser} ->
+          Localiser.update(localiser, percept(Pose.new(0, 0), 100 * k, [part]))
+        end)
+
+      assert percept.uncertainty.radius <= before.uncertainty.radius + 1.0e-6
+      assert Pose.distance(percept.pose, truth) < 0.05
+      assert abs(percept.pose.heading) < 0.02
+    end
+  end
+
   test "without references the pose is the odometry's, from the start pose" do
     localiser = Localiser.new(Pose.new(1, 2, :math.pi() / 2))
     {percept, localiser} = Localiser.update(localiser, percept(Pose.new(0, 0), 0))

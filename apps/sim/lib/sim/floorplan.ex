@@ -6,13 +6,14 @@ defmodule Sim.Floorplan do
   `field` has one byte per cell, rows from the lowest y: the distance to the nearest wall in
   cells, counted as a king moves in chess and at most 255; 0 is wall. Rays and bodies use it to
   jump over free space. `room` is the rectangle where a fleet starts. `grey` is the shade of a picture that was taken for wall
-  because it seems to stand for what is unknown, `nil` if none was.
+  because it seems to stand for what is unknown, `nil` if none was. `unknown` has one byte per cell, too: 1 is wall only because
+  it is not known what is there; `nil` if no cell is.
   """
   alias Nav.Grid
   alias Sim.Floorplan.{Cells, Clearance, Image, Landmark, Maps, Places, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
-  defstruct @enforce_keys ++ [grey: nil]
+  defstruct @enforce_keys ++ [grey: nil, unknown: nil]
 
   @typedoc "What the grey of a picture is that seems to stand for what is unknown (`Nav.MapFile.Picture.unknown/1`)."
   @type grey :: :wall | :floor
@@ -26,7 +27,8 @@ defmodule Sim.Floorplan do
           cell: float(),
           field: binary(),
           room: rectangle(),
-          grey: byte() | nil
+          grey: byte() | nil,
+          unknown: binary() | nil
         }
 
   @doc """
@@ -72,6 +74,13 @@ defmodule Sim.Floorplan do
   """
   @spec wall?(t(), point()) :: boolean()
   def wall?(%__MODULE__{} = map, point), do: Clearance.steps(map, point) == 0
+
+  @doc "Whether this point is wall only because it is not known what is there."
+  @spec unknown?(t(), point()) :: boolean()
+  def unknown?(%__MODULE__{unknown: nil}, _point), do: false
+
+  def unknown?(%__MODULE__{unknown: unknown} = map, point),
+    do: :binary.at(unknown, Cells.cell(map, point)) == 1
 
   @doc """
   Whether a disc of this radius fits here.

@@ -25,7 +25,8 @@ defmodule Sim.Scene do
   One robot. `slot` is its place in the formation relative to the leader's true pose; `size_ppm`
   is the share of its picture that the landmark fills, in parts per million, and `nil` while it
   does not see it. By its own estimate the robot is within `uncertainty` metres of where it
-  believes to be in 95 of 100 cases, `nil` if it does not know.
+  believes to be (`believed`, in the frame of its estimate) in 95 of 100 cases, `nil` if it does not know. `blocked_by` and
+  `says` are the lines of its mission for people, `nil` if there is nothing to say.
   """
   @type robot :: %{
           required(:id) => atom(),
@@ -37,6 +38,8 @@ defmodule Sim.Scene do
           required(:leader?) => boolean(),
           required(:uncertainty) => float() | nil,
           required(:size_ppm) => non_neg_integer() | nil,
+          optional(:believed) => Pose.t() | nil,
+          optional(:blocked_by) => String.t() | nil,
           optional(:says) => String.t() | nil,
           optional(atom()) => term()
         }

@@ -140,6 +140,13 @@ defmodule Swarm.Member do
          else: (_no_pose -> nil)
   end
 
+  @doc "The pose that the robot believes to have, in the frame of its estimate (metres, radians), or `nil`."
+  @spec believed(t()) :: Hal.Pose.t() | nil
+  def believed(member) do
+    with %Percept{pose: pose} <- Controller.percept(role(member, :executive).controller),
+         do: pose
+  end
+
   @doc """
   What the robot's mission claims (`t:Robot.Mission.effect/0`).
   """

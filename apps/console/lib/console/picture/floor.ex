@@ -1,14 +1,16 @@
 defmodule Console.Picture.Floor do
   @moduledoc false
-  # Draws the upper part of a run's picture: walls, each robot's path, and where each ended. Pure.
-  alias Console.Picture.{MapView, RunTrack, Svg}
-  alias Console.Picture.{Colours, Labels}
+  # Draws the upper part of a run's picture: walls, each robot's path, where each ended, and where it believes to have ended.
+  # Pure.
+  alias Console.Picture.{Account, Colours, Labels, MapView, RunTrack, Svg, Walls}
   alias Hal.Pose
 
   @aspect 1.25
-  @wall "#4A4F57"
   @ink "#22262B"
   @landmark "#F2C200"
+  @wrong "#C00000"
+  # A slot is looked at in so many directions.
+  @looks 8
 
   @doc """
   The part of the map worth showing: all of it, or the surroundings of the paths if they fill much
@@ -18,7 +20,8 @@ defmodule Console.Picture.Floor do
   def box(ground, track) do
     places = List.flatten(Map.values(track.ways)) ++ track.landmark
     slots = for %{slot: {_x, _y} = slot} <- track.last.robots, do: slot
-    around = &MapView.around(ground, places ++ slots, 1.0, &1)
+    believed = for robot <- astray(track.last), do: Pose.point(robot.believed)
+    around = &MapView.around(ground, places ++ slots ++ believed, 1.0, &1)
     {left, bottom, right, top} = around.({5.0, 5.0})
     {wide, high} = {right - left, top - bottom}
     # It gets the proportions of the area that it is drawn in, if the map has the room.
@@ -43,20 +46,22 @@ defmodule Console.Picture.Floor do
       Svg.element(:rect, width: width, height: height, fill: "#FBFBF9"),
       Svg.group([clip_path: "url(#floor)"], [
         grid(box, at),
-        walls(ground, box, scale),
+        Walls.draw(ground, box, scale),
         landmark_way(track, at),
         Enum.map(track.first.robots, &way(&1, track, colours, at)),
         Enum.map(track.first.robots, &start(&1, colours, at, scale)),
-        slots(track.last, at, scale),
+        slots(ground, track.last, colours, at, scale),
         landmark(track.last.landmark, at, scale),
+        Enum.map(track.last.robots, &uncertainty(&1, colours, at, scale)),
+        track.last |> astray() |> Enum.map(&believed(&1, colours, at, scale)),
         Enum.map(track.last.robots, &robot(&1, colours, at, scale)),
-        Labels.draw(track, at, scale, width)
+        Labels.draw(track, at, scale, {width, height})
       ]),
       Svg.element(:rect,
         width: width,
         height: height,
         fill: "none",
-        stroke: @wall,
+        stroke: Walls.wall(),
         stroke_width: 1
       ),
       ruler(width, height, scale)
@@ -93,41 +98,6 @@ defmodule Console.Picture.Floor do
         for y <- ceil(bottom)..floor(top)//1, do: line.({left, y}, {right, y})
 
     Svg.group([stroke: "#E9E9E4", stroke_width: 1], lines)
-  end
-
-  # Wall cells of one row that touch become one rectangle.
-  defp walls(ground, {left, bottom, right, top}, scale) do
-    cell = max(0.05, (right - left) / 360)
-    columns = ceil((right - left) / cell)
-
-    rows =
-      for row <- 0..(ceil((top - bottom) / cell) - 1)//1 do
-        y = top - (row + 0.5) * cell
-
-        0..(columns - 1)
-        |> Enum.map(&ground.wall?.(left + (&1 + 0.5) * cell, y))
-        |> runs()
-        |> Enum.map(fn {from, count} ->
-          Svg.element(:rect,
-            x: from * cell * scale,
-            y: row * cell * scale,
-            width: count * cell * scale,
-            height: cell * scale + 0.3
-          )
-        end)
-      end
-
-    Svg.group([fill: @wall, shape_rendering: "crispEdges"], rows)
-  end
-
-  defp runs(row) do
-    row
-    |> Enum.chunk_by(& &1)
-    |> Enum.map_reduce(0, fn chunk, from ->
-      {{hd(chunk), from, length(chunk)}, from + length(chunk)}
-    end)
-    |> elem(0)
-    |> Enum.flat_map(fn {wall?, from, count} -> if wall?, do: [{from, count}], else: [] end)
   end
 
   defp landmark_way(%{landmark: way}, at) when length(way) > 1 do
@@ -177,17 +147,10 @@ defmodule Console.Picture.Floor do
   defp robot(%{alive: false} = robot, colours, at, scale) do
     {colour, _dash} = colours[robot.id]
     {x, y} = at.(Pose.point(robot.pose))
-    r = 0.7 * Colours.size(robot, scale)
-    cross = "M#{-r},#{-r} L#{r},#{r} M#{-r},#{r} L#{r},#{-r}"
 
     [
       body(robot, at, scale, fill: "#C9CCD1", stroke: colour, stroke_width: 1.5),
-      Svg.element(:path,
-        d: cross,
-        transform: "translate(#{x} #{y})",
-        stroke: "#A00000",
-        stroke_width: 2.5
-      )
+      cross(x, y, 0.7 * Colours.size(robot, scale), @wrong, 2.5)
     ]
   end
 
@@ -233,20 +196,96 @@ defmodule Console.Picture.Floor do
     ]
   end
 
-  defp slots(scene, at, scale) do
+  defp slots(ground, scene, colours, at, scale) do
     for %{slot: {_x, _y} = slot} = robot <- scene.robots do
       {x, y} = at.(slot)
-
-      Svg.element(:circle,
-        cx: x,
-        cy: y,
-        r: Colours.size(robot, scale) + 2.5,
-        fill: "none",
-        stroke: @ink,
-        stroke_width: 1,
-        stroke_dasharray: "3 3"
-      )
+      {colour, _dash} = colours[robot.id]
+      slot(x, y, Colours.size(robot, scale) + 2.5, colour, walled?(ground, robot))
     end
+  end
+
+  @doc "A place in the formation in the colour of its robot, marked where it lies in a wall; all in pixels."
+  @spec slot(float(), float(), float(), String.t(), walled? :: boolean()) :: iodata()
+  def slot(x, y, r, colour, walled?) do
+    look = [fill: "none", stroke: colour, stroke_width: 1.5, stroke_dasharray: "3 3"]
+
+    [
+      Svg.element(:circle, [cx: x, cy: y, r: r] ++ look),
+      if(walled?, do: cross(x, y, 0.6 * r, @wrong, 2.5), else: [])
+    ]
+  end
+
+  @doc "Whether the place of a robot lies so that its body would be in a wall there, or in what is not known."
+  @spec walled?(MapView.t(), Sim.Scene.robot()) :: boolean()
+  def walled?(_ground, %{slot: nil}), do: false
+
+  def walled?(ground, %{slot: {x, y}, radius: radius}) do
+    around =
+      for k <- 1..@looks, angle = 2 * :math.pi() * k / @looks do
+        {x + radius * :math.cos(angle), y + radius * :math.sin(angle)}
+      end
+
+    Enum.any?([{x, y} | around], fn {x, y} -> ground.wall?.(x, y) end)
+  end
+
+  defp astray(scene), do: Enum.filter(scene.robots, &Account.off_m/1)
+
+  # A line from where the robot is to where it believes to be.
+  defp believed(robot, colours, at, scale) do
+    {colour, _dash} = colours[robot.id]
+    {{x1, y1}, {x2, y2}} = {at.(Pose.point(robot.pose)), at.(Pose.point(robot.believed))}
+
+    [
+      Svg.element(:line, x1: x1, y1: y1, x2: x2, y2: y2, stroke: colour, stroke_width: 1.2),
+      belief(x2, y2, Colours.size(robot, scale), colour)
+    ]
+  end
+
+  @doc "The sign of where a robot believes to be, in pixels."
+  @spec belief(float(), float(), float(), String.t()) :: iodata()
+  def belief(x, y, r, colour) do
+    [
+      Svg.element(:circle, cx: x, cy: y, r: r, fill: "none", stroke: colour, stroke_width: 1.5),
+      cross(x, y, 0.7 * r, colour, 1.5)
+    ]
+  end
+
+  # It is within this circle, as it believes.
+  defp uncertainty(robot, colours, at, scale) do
+    if doubt?(robot) do
+      {x, y} = at.(Pose.point(robot[:believed] || robot.pose))
+      doubt(x, y, robot.uncertainty * scale, elem(colours[robot.id], 0))
+    else
+      []
+    end
+  end
+
+  @doc "Whether a robot may be farther off than it is wide, by its own word."
+  @spec doubt?(Sim.Scene.robot()) :: boolean()
+  def doubt?(robot),
+    do: robot.alive and robot.uncertainty != nil and robot.uncertainty > robot.radius
+
+  @doc "The circle within which a robot believes to be, in pixels."
+  @spec doubt(float(), float(), float(), String.t()) :: iodata()
+  def doubt(x, y, r, colour) do
+    Svg.element(:circle,
+      cx: x,
+      cy: y,
+      r: r,
+      fill: "none",
+      stroke: colour,
+      stroke_width: 1.5,
+      stroke_dasharray: "2 4"
+    )
+  end
+
+  defp cross(x, y, r, colour, width) do
+    Svg.element(:path,
+      d: "M#{-r},#{-r} L#{r},#{r} M#{-r},#{r} L#{r},#{-r}",
+      transform: "translate(#{x} #{y})",
+      stroke: colour,
+      stroke_width: width
+    )
   end
 
   defp landmark(nil, _at, _scale), do: []

@@ -16,6 +16,7 @@ defmodule Console.Picture.Floorplan do
   def of(%Sim.Floorplan{} = map) do
     {width, height} = Sim.Floorplan.size(map)
     wall? = fn x, y -> Sim.Floorplan.wall?(map, {x, y}) end
-    %MapView{name: map.name, width: width, height: height, wall?: wall?}
+    unknown? = if map.unknown, do: fn x, y -> Sim.Floorplan.unknown?(map, {x, y}) end
+    %MapView{name: map.name, width: width, height: height, wall?: wall?, unknown?: unknown?}
   end
 end

@@ -1,20 +1,44 @@
 defmodule Console.Picture.Labels do
-  @moduledoc "Places names and numbered stages on a run's picture so that they hide little. Pure."
-  alias Console.Picture.{RunTrack, Svg}
-  alias Console.Picture.Colours
+  @moduledoc false
+  # Places the numbered stages on a run's picture, and beside each robot its name with what it does and why, so that no label
+  # hides another. Where there is no room for all words, the name alone stands there; the legend has the words. Pure.
+  alias Console.Cli.Format
+  alias Console.Picture.{Account, Colours, RunTrack, Svg}
   alias Hal.Pose
 
   @ink "#22262B"
+  @soft "#3F454E"
   @halo [paint_order: "stroke", stroke: "#FFFFFF", stroke_width: 3, stroke_linejoin: "round"]
+  # In a crowd the legend and the colours must suffice.
+  @most 24
+  # Characters of a row, pixels of one of them, and of a row's height.
+  @chars 26
+  @char 6.4
+  @row 13
+  # How far from its robot a label may stand, in pixels, besides beside it.
+  @rings [0, 24, 56]
+  @directions [
+    {1.0, 0.0},
+    {-1.0, 0.0},
+    {0.0, 1.0},
+    {0.0, -1.0},
+    {0.7, 0.7},
+    {-0.7, 0.7},
+    {0.7, -0.7},
+    {-0.7, -0.7}
+  ]
 
-  @doc "All labels; `at` turns metres into pixels."
-  @spec draw(RunTrack.t(), (Pose.point() -> {float(), float()}), float(), float()) :: iodata()
-  def draw(track, at, scale, width) do
+  @typep box :: {left :: float(), top :: float(), wide :: float(), high :: float()}
+
+  @doc "All labels in a field of this size; `at` turns metres into pixels."
+  @spec draw(RunTrack.t(), (Pose.point() -> {float(), float()}), float(), {float(), float()}) ::
+          iodata()
+  def draw(track, at, scale, size) do
     marks = marks(track, at, scale)
     taken = for {_number, {x, y}} <- marks, do: {x - 9, y - 9, 18, 18}
 
     [
-      names(track.last, at, scale, width, taken),
+      names(track, at, scale, size, taken),
       for({number, {x, y}} <- marks, do: badge(number, x, y))
     ]
   end
@@ -53,40 +77,90 @@ defmodule Console.Picture.Labels do
       else: spot
   end
 
-  defp names(scene, at, scale, width, taken) do
-    # In a crowd the legend and the colours must suffice.
-    if length(scene.robots) > 24 do
-      []
-    else
-      scene.robots
-      |> Enum.map_reduce(obstacles(scene, at, scale) ++ taken, fn robot, taken ->
-        spot = robot |> spots(at, scale, width) |> Enum.min_by(&crowd(&1, taken))
-        {name(robot, spot), [spot | taken]}
-      end)
-      |> elem(0)
-    end
+  defp names(%{last: %{robots: robots}}, _at, _scale, _size, _taken)
+       when length(robots) > @most,
+       do: []
+
+  # Those in trouble get their words first, and the others as far as there is room.
+  defp names(%{last: scene} = track, at, scale, {width, height}, taken) do
+    # The ruler is in the lower right corner.
+    ruler = {width - scale - 20, height - 34, scale + 12, 28}
+    bodies = [ruler | obstacles(scene, at, scale) ++ taken]
+
+    scene.robots
+    |> Enum.sort_by(&(not Account.trouble?(&1)))
+    |> Enum.map_reduce([], fn robot, labels ->
+      {spot, rows} = place(robot, track, at, scale, {width, height}, {labels, bodies})
+      {{pointer(robot, spot, at, scale), label(robot, spot, rows)}, [spot | labels]}
+    end)
+    |> elem(0)
+    |> Enum.unzip()
+    |> Tuple.to_list()
   end
 
-  # The boxes where a name may stand: right, left, above or below its robot.
-  defp spots(robot, at, scale, width) do
+  # `labels` are those that stand already, `bodies` what else should not be hidden.
+  defp place(robot, track, at, scale, size, {labels, bodies}) do
+    name = ["#{robot.id}"]
+    doubt = Account.doubt(robot, RunTrack.since_s(track, robot.id))
+    why = rows(Account.doing(robot))
+
+    Enum.find_value([name ++ why ++ rows(doubt), name ++ why], fn rows ->
+      free =
+        robot |> spots(rows, at, scale, size) |> Enum.find(&(crowd(&1, labels ++ bodies) == 0.0))
+
+      free && {free, rows}
+    end) ||
+      {robot
+       |> spots(name, at, scale, size)
+       |> Enum.min_by(&{crowd(&1, labels), crowd(&1, bodies)}), name}
+  end
+
+  defp rows(text), do: for(row <- Format.rows(text, @chars), row != "", do: String.trim(row))
+
+  # The boxes where a label may stand: beside its robot in eight directions, and farther off.
+  @spec spots(map(), [String.t()], function(), float(), {float(), float()}) :: [box()]
+  defp spots(robot, rows, at, scale, {width, height}) do
     {x, y} = at.(Pose.point(robot.pose))
-    r = Colours.size(robot, scale) + 7
-    wide = 34
+    wide = @char * (rows |> Enum.map(&String.length/1) |> Enum.max())
+    high = 1.0 * @row * length(rows)
 
-    for {left, top} <- [
-          {x + r, y - 6},
-          {x - r - wide, y - 6},
-          {x - wide / 2, y + r},
-          {x - wide / 2, y - r - 12}
-        ],
-        left > 2 and left + wide < width,
-        do: {left, top, wide, 12}
+    all =
+      for ring <- @rings, {dx, dy} <- @directions do
+        r = Colours.size(robot, scale) + 7 + ring
+
+        {x + r * dx + (sign(dx) - 1) / 2 * wide, y + r * dy + (sign(dy) - 1) / 2 * high, wide,
+         high}
+      end
+
+    inside =
+      for {left, top, _, _} = box <- all,
+          left > 2,
+          left + wide < width,
+          top > 2,
+          top + high < height,
+          do: box
+
+    if inside == [], do: Enum.take(all, 1), else: inside
   end
+
+  defp sign(d) when d > 0, do: 1
+  defp sign(d) when d < 0, do: -1
+  defp sign(_zero), do: 0
 
   defp obstacles(scene, at, scale) do
-    for robot <- scene.robots do
-      {x, y} = at.(Pose.point(robot.pose))
-      r = Colours.size(robot, scale) + 3
+    bodies =
+      for robot <- scene.robots,
+          place <- [robot.pose, Account.off_m(robot) && robot.believed],
+          place != nil,
+          do: {Pose.point(place), Colours.size(robot, scale) + 3}
+
+    slots =
+      for %{slot: {_, _} = slot} = robot <- scene.robots, do: {slot, Colours.size(robot, scale)}
+
+    landmark = if scene.landmark, do: [{scene.landmark, max(0.25 * scale, 7.0)}], else: []
+
+    for {place, r} <- bodies ++ slots ++ landmark do
+      {x, y} = at.(place)
       {x - r, y - r, 2 * r, 2 * r}
     end
   end
@@ -100,17 +174,41 @@ defmodule Console.Picture.Labels do
     |> Enum.sum()
   end
 
-  defp name(robot, {left, top, wide, _high}) do
+  defp label(robot, {left, top, wide, high}, rows) do
+    [name | words] = Enum.with_index(rows)
+    middle = left + wide / 2
+
+    [
+      Svg.element(:rect,
+        x: left,
+        y: top,
+        width: wide,
+        height: high,
+        rx: 3,
+        fill: "#FFFFFF",
+        opacity: 0.75
+      ),
+      line(name, middle, top, if(robot.leader?, do: "bold", else: "normal"), @ink),
+      for(row <- words, do: line(row, middle, top, "normal", @soft))
+    ]
+  end
+
+  defp line({text, k}, x, top, weight, colour) do
     Svg.text(
-      Atom.to_string(robot.id),
-      left + wide / 2,
-      top + 10,
-      [
-        font_size: 11,
-        font_weight: if(robot.leader?, do: "bold", else: "normal"),
-        fill: @ink,
-        text_anchor: "middle"
-      ] ++ @halo
+      text,
+      x,
+      top + 10 + @row * k,
+      [font_size: 11, font_weight: weight, fill: colour, text_anchor: "middle"] ++ @halo
     )
+  end
+
+  # A label that does not stand beside its robot has a line to it.
+  defp pointer(robot, {left, top, wide, high}, at, scale) do
+    {x, y} = at.(Pose.point(robot.pose))
+    {px, py} = {x |> max(left) |> min(left + wide), y |> max(top) |> min(top + high)}
+
+    if Pose.distance({x, y}, {px, py}) > Colours.size(robot, scale) + 12,
+      do: Svg.element(:line, x1: x, y1: y, x2: px, y2: py, stroke: @soft, stroke_width: 0.8),
+      else: []
   end
 end

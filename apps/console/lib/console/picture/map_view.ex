@@ -1,17 +1,29 @@
 defmodule Console.Picture.MapView do
   @moduledoc false
-  # Holds a map for the views: its sides in metres, with the origin in the middle, and its walls. Pure.
+  # Holds a map for the views: its sides in metres, with the origin in the middle, and its walls; `unknown?` says which of
+  # these are walls only because it is not known what is there (`nil`: none). Pure.
 
   @enforce_keys [:name, :width, :height, :wall?]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [unknown?: nil]
 
   @type box :: {left :: float(), bottom :: float(), right :: float(), top :: float()}
   @type t :: %__MODULE__{
           name: String.t(),
           width: float(),
           height: float(),
-          wall?: (float(), float() -> boolean())
+          wall?: (float(), float() -> boolean()),
+          unknown?: (float(), float() -> boolean()) | nil
         }
+
+  @doc "What is at a point."
+  @spec kind(t(), float(), float()) :: :floor | :wall | :unknown
+  def kind(%__MODULE__{wall?: wall?, unknown?: unknown?}, x, y) do
+    cond do
+      not wall?.(x, y) -> :floor
+      unknown? != nil and unknown?.(x, y) -> :unknown
+      true -> :wall
+    end
+  end
 
   @doc """
   The whole map as a box.

@@ -9,6 +9,10 @@ defmodule Console.Picture.Plot do
   @max "#D55E00"
   @mean "#0072B2"
   @limit 0.25
+  # Of the axis of errors, in metres.
+  @marks [0, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512]
+  # Of a curve, at most so many points are drawn.
+  @most 1_500
 
   @doc """
   The plot in a field of this size, with its upper left corner at 0,0; axis labels are outside.
@@ -19,7 +23,7 @@ defmodule Console.Picture.Plot do
     top = top(track.errors)
     x = fn at_s -> at_s / end_s * width end
     # A square-root scale shows both the first metres of the error and the last centimetres.
-    y = fn metres -> height - :math.sqrt(min(metres, top) / top) * height end
+    y = fn metres -> height - :math.sqrt(metres / top) * height end
 
     [
       Svg.element(:rect, width: width, height: height, fill: "#FBFBF9"),
@@ -47,11 +51,16 @@ defmodule Console.Picture.Plot do
     ]
   end
 
+  # The axis ends at the first mark beyond the largest error.
   defp top([]), do: 1.0
-  defp top(errors), do: errors |> Enum.map(&elem(&1, 2)) |> Enum.max() |> max(0.5)
+
+  defp top(errors) do
+    largest = errors |> Enum.map(&elem(&1, 2)) |> Enum.max()
+    Enum.find(@marks, largest, &(&1 >= max(largest, 0.5)))
+  end
 
   defp horizontal(top, width, y) do
-    for metres <- [0, 0.1, 0.5, 1, 2, 4, 8, 16, 32], metres <= top do
+    for metres <- @marks, metres <= top do
       at = y.(metres)
 
       [
@@ -63,9 +72,12 @@ defmodule Console.Picture.Plot do
 
   defp vertical(end_s, height, x) do
     step = step(end_s, 12)
+    last = floor(end_s / step)
+    # The end has a mark, too, unless it would be written over the one before.
+    ends = if end_s - last * step > 0.5 * step, do: [end_s], else: []
 
-    for k <- 0..floor(end_s / step) do
-      at = x.(k * step)
+    for at_s <- Enum.map(0..last, &(&1 * step)) ++ ends do
+      at = x.(at_s)
 
       [
         Svg.element(:line,
@@ -76,7 +88,7 @@ defmodule Console.Picture.Plot do
           stroke: @soft,
           stroke_width: 1
         ),
-        Svg.text(tick(k * step, step), at, height + 17, label(text_anchor: "middle"))
+        Svg.text(tick(at_s, step), at, height + 17, label(text_anchor: "middle"))
       ]
     end
   end
@@ -157,8 +169,13 @@ defmodule Console.Picture.Plot do
     if at_s - last_s > 0.25, do: {:cont, part, [error]}, else: {:cont, [error | part]}
   end
 
-  defp thin(part) when length(part) > 1500, do: Enum.take_every(part, div(length(part), 750))
+  # Of neighbours the worst is drawn, so that no peak is missing.
+  defp thin(part) when length(part) > @most,
+    do: part |> Enum.chunk_every(div(length(part), div(@most, 2))) |> Enum.map(&worst/1)
+
   defp thin(part), do: part
+
+  defp worst(errors), do: Enum.max_by(errors, &elem(&1, 2))
 
   defp key(%{errors: []}, width) do
     Svg.text(

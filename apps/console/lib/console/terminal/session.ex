@@ -396,8 +396,11 @@ defmodule Console.Terminal.Session do
     formed? = session.module.scene(session.live).formed?
     wall_s = (Hal.Clock.now_ms() - session.started_ms) / 1000
     Enum.each(Report.summary(result, formed?, wall_s), &Output.line(session.output, &1))
-    title = Picture.title(length(options.robots), options.map, options.seed)
-    drawing = session.track && fn -> Picture.draw(session.track, title) end
+
+    drawing =
+      session.track &&
+        fn -> Picture.draw(session.track, Picture.title(Options.trial(options))) end
+
     session.module.stop(session.live)
 
     case Report.write(options, Report.json(result, wall_s), drawing, session.output) do

@@ -36,7 +36,9 @@ defmodule Lab.Trial.Evaluation do
           state: account.state,
           slot: slot && Pose.point(slot),
           leader?: id == leader,
+          believed: claim[:believed],
           uncertainty: claim[:uncertainty],
+          blocked_by: claim[:blocked_by],
           says: claim[:says],
           size_ppm: account.sight && account.sight.size_ppm
         }

@@ -30,8 +30,8 @@ defmodule Lab.Trial.Mechanics do
   def living(trial), do: Enum.filter(trial.options.robots, &is_map_key(trial.members, &1))
 
   @doc """
-  What each living robot claims about itself, and, whatever its mission is, how certain its pose
-  is.
+  What each living robot claims about itself, and, whatever its mission is, where it believes to be, and how certain it is of
+  that.
   """
   @spec claims(trial()) :: [{atom(), map()}]
   def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
@@ -39,6 +39,7 @@ defmodule Lab.Trial.Mechanics do
   defp claim(member) do
     claim = Manual.shown(Runner.state(Member.runner(member)), Member.claim(member))
     claim = Map.put_new(claim, :uncertainty, Member.uncertainty(member))
+    claim = Map.put(claim, :believed, Member.believed(member))
     if callers = Member.held(member), do: Map.put(claim, :estop, callers), else: claim
   end
 

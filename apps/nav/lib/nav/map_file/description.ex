@@ -9,9 +9,10 @@ defmodule Nav.MapFile.Description do
   # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
   # surely free, less than `free_thresh`, is wall; so is 205, which map_server writes for what it does
   # not know, and what is transparent, which gets a shade (`transparent`) that is wall. With `mode: raw` the shades are no
-  # shades but the share in per cent, and what is above 100 is unknown.
+  # shades but the share in per cent, and what is above 100 is unknown. `known` are those of the shades that are surely wall, at
+  # least `occupied_thresh`.
 
-  @enforce_keys [:image, :resolution, :origin, :shades, :transparent]
+  @enforce_keys [:image, :resolution, :origin, :shades, :known, :transparent]
   defstruct @enforce_keys
 
   @type t :: %__MODULE__{
@@ -19,6 +20,7 @@ defmodule Nav.MapFile.Description do
           resolution: float(),
           origin: {x :: float(), y :: float(), turn :: float()},
           shades: Nav.MapFile.Runs.marks(),
+          known: Nav.MapFile.Runs.marks(),
           transparent: byte()
         }
 
@@ -55,6 +57,7 @@ defmodule Nav.MapFile.Description do
          resolution: resolution,
          origin: origin,
          shades: shades(mode, min(free, occupied), light?),
+         known: known(mode, occupied, light?),
          transparent: if(mode == :raw or light?, do: 254, else: 0)
        )}
     end
@@ -201,9 +204,13 @@ defmodule Nav.MapFile.Description do
     do: Nav.MapFile.Runs.marks(&(&1 > 100 or &1 / 100 >= free))
 
   defp shades(:shades, free, light?) do
-    Nav.MapFile.Runs.marks(fn shade ->
-      occupied = if light?, do: shade / 255, else: (255 - shade) / 255
-      occupied >= free or (shade == 205 and not light?)
-    end)
+    Nav.MapFile.Runs.marks(&(occupied(&1, light?) >= free or (&1 == 205 and not light?)))
   end
+
+  defp known(:raw, most, _light?), do: Nav.MapFile.Runs.marks(&(&1 <= 100 and &1 / 100 >= most))
+
+  defp known(:shades, most, light?),
+    do: Nav.MapFile.Runs.marks(&(occupied(&1, light?) >= most and (&1 != 205 or light?)))
+
+  defp occupied(shade, light?), do: if(light?, do: shade / 255, else: (255 - shade) / 255)
 end

@@ -53,11 +53,14 @@ defmodule Nav.MapFile.DescriptionTest do
           )
   end
 
-  test "what is not surely free is wall" do
-    walls = fn yaml ->
-      {:ok, %{shades: shades}} = Description.parse(yaml)
-      for grey <- 0..255, elem(shades, grey), do: grey
+  test "what is not surely free is wall, of which what is surely occupied is known" do
+    marked = fn yaml, which ->
+      {:ok, description} = Description.parse(yaml)
+      for grey <- 0..255, elem(Map.fetch!(description, which), grey), do: grey
     end
+
+    walls = &marked.(&1, :shades)
+    known = &marked.(&1, :known)
 
     assert walls.(@yaml) == Enum.to_list(0..205)
     assert walls.(with_line("free_thresh", "free_thresh: 0.25")) == Enum.to_list(0..191) ++ [205]
@@ -66,6 +69,10 @@ defmodule Nav.MapFile.DescriptionTest do
     assert walls.(with_line("mode", "mode: scale")) == Enum.to_list(0..205)
     # The shares themselves, in per cent; above 100 it is unknown.
     assert walls.(with_line("mode", "mode: raw")) == Enum.to_list(20..255)
+
+    assert known.(@yaml) == Enum.to_list(0..89)
+    assert known.(with_line("negate", "negate: 1")) == Enum.to_list(166..255)
+    assert known.(with_line("mode", "mode: raw")) == Enum.to_list(65..100)
   end
 
   test "an origin may be turned, and what is transparent gets a shade that is wall" do

@@ -6,7 +6,8 @@ defmodule Robot.Localiser.Consistency do
   uses the blobs that happen to match and ignores the others. But the picture shows the
   contradiction: robots where there can be none, or no robot where there must be one. The possible
   places of this robot and of the others follow from their standard deviations; a picture
-  contradicts the estimate if enough columns do not fit within 2.5 of them.
+  contradicts the estimate if enough columns do not fit within 2.5 of them. Walls of a plan may hide a robot, or a part of it: one
+  must be seen only if they do not from any of these places, and may be if they do not from one.
   `Robot.Localiser.Belief.weigh/2` counts such pictures.
   """
   alias Hal.Pose
@@ -41,7 +42,7 @@ defmodule Robot.Localiser.Consistency do
     covered = Columns.union(seen, Columns.seen(hiding, Enum.map(hiding, & &1.colour)))
     view = Sighting.field_of_view(percept)
     glance = Glance.new(belief, exposed, percept.detections.pan, view)
-    in_sight = InSight.new(percept.grid, belief, exposed)
+    in_sight = InSight.new(percept.grid, belief, exposed, [@sds / 2, @sds])
     look = {belief, exposed, Columns.camera(percept), glance, in_sight}
 
     cond do
@@ -80,7 +81,8 @@ defmodule Robot.Localiser.Consistency do
       bearing = Pose.bearing(exposed, mark.at)
       doubt = @sds * bearing_sd(belief, exposed, mark) + @border_sd
       core = half - doubt
-      must = if core > 0.0 and near < @in_sight, do: Columns.span(bearing, core, camera), else: 0
+      must? = core > 0.0 and near < @in_sight and InSight.whole?(in_sight, mark)
+      must = if must?, do: Columns.span(bearing, core, camera), else: 0
       {Columns.span(bearing, half + doubt, camera), must}
     end
   end

@@ -50,17 +50,31 @@ defmodule Robot.Localiser.Sightings do
 
   # There is only one landmark: the largest unclipped blob of its colour is taken for it. Its distance is by its area
   # alone, whose error the filter knows as that of a scale; one by its width would have another.
-  defp see_landmarks(belief, landmarks, {percept, _back} = picture) do
+  # Where a wall hides a part of it, it is nearer than its area says, and its middle elsewhere.
+  defp see_landmarks(belief, landmarks, {percept, back} = picture) do
+    view = Sighting.field_of_view(percept)
+
     Enum.reduce(landmarks, belief, fn mark, belief ->
       case whole(percept, mark.colour) do
         nil ->
           belief
 
         %{blob: blob, bearing: bearing} ->
-          distance = Sighting.distance(blob, percept.detections.blobs)
-          see(belief, picture, mark, bearing, 0.0, distance)
+          if Sighting.narrow?(blob, mark.radius, view) do
+            far = Pose.distance(exposed(belief, back), mark.at)
+            see(belief, picture, mark, bearing, missing(blob, mark.radius, far, view), nil)
+          else
+            distance = Sighting.distance(blob, percept.detections.blobs)
+            see(belief, picture, mark, bearing, 0.0, distance)
+          end
       end
     end)
+  end
+
+  # Half of the width that a blob lacks, in radians.
+  defp missing(blob, radius, far, view) do
+    half = (blob.right - blob.left + 1) / blob.width * :math.tan(view / 2)
+    max(:math.asin(min(radius / max(far, @near), 1.0)) - :math.atan(half), 0.0)
   end
 
   defp whole(%{detections: %{blobs: blobs} = picture} = percept, colour) do

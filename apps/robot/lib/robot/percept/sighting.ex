@@ -39,6 +39,8 @@ defmodule Robot.Percept.Sighting do
   # Boxes up to this many pixels apart count as touching, because the border between two colours
   # belongs to neither.
   @touch 3
+  # A blob with less than this share of the width that it should have is not whole.
+  @narrow 0.8
   # A clipped blob that covers more of the picture than this is too near to be measured.
   @too_near_share 0.2
 
@@ -121,6 +123,24 @@ defmodule Robot.Percept.Sighting do
       do: unless(hidden?(blob, blobs), do: distance_by_width(blob, radius, view))
 
   def distance(blob, blobs, _radius, _view), do: distance(blob, blobs)
+
+  @doc """
+  Whether something without a colour, such as a wall, hides a part of an upright object of this radius (metres), in a picture with
+  this field of view: its blob is narrower by a fifth, and a pixel, than such a one is at the distance that its area says.
+
+      iex> whole = %Vision.Blob{colour: "Y", area: 1280, share: 0.017, x: 159.5, y: 120.0, left: 142, right: 176, top: 60,
+      ...>   bottom: 208, width: 320, height: 240, distance: 2.4}
+      iex> half = %{whole | left: 160, distance: 3.4}
+      iex> for blob <- [whole, half], do: Robot.Percept.Sighting.narrow?(blob, 0.15, :math.pi() / 3)
+      [false, true]
+  """
+  @spec narrow?(Blob.t(), radius :: float(), field_of_view :: float()) :: boolean()
+  def narrow?(%Blob{distance: nil}, _radius, _field_of_view), do: false
+
+  def narrow?(%Blob{} = blob, radius, field_of_view) do
+    whole = width(radius, blob.distance, blob.width, field_of_view)
+    whole != nil and blob.right - blob.left + 2 < @narrow * whole
+  end
 
   @doc "Whether something of another colour may hide a part of the blob: their boxes touch."
   @spec hidden?(Blob.t(), [Blob.t()]) :: boolean()

@@ -43,7 +43,7 @@ defmodule Robot.Localiser.ConsistencyTest do
     }
   end
 
-  defp judge(robots, blobs, belief \\ Belief.new(@here), back \\ @here) do
+  defp judge(robots, blobs, belief \\ Belief.new(@here), back \\ @here, grid \\ nil) do
     Consistency.judge(
       belief,
       robots,
@@ -51,6 +51,7 @@ defmodule Robot.Localiser.ConsistencyTest do
         robot: :mag1,
         at_ms: 0,
         profile: Profile.magellan(),
+        grid: grid,
         detections: %Detections{at_ms: 0, blobs: blobs, field_of_view: @view}
       },
       back
@@ -81,6 +82,34 @@ defmodule Robot.Localiser.ConsistencyTest do
   test "a robot that is far away may stand behind a wall" do
     assert judge([robot(1, {3.5, 0.0}, 0.02, 0.6)], []) == :unknown
     assert judge([robot(1, {2.5, 0.0}, 0.02, 0.6)], []) == :contradicted
+  end
+
+  # A wall across the way at x = 0.8 m, where `wall?` says so of y.
+  defp wall(wall?) do
+    cells =
+      for j <- 0..79, i <- 0..79, into: <<>> do
+        if i == 48 and wall?.(-4.0 + 0.1 * (j + 0.5)), do: <<1>>, else: <<0>>
+      end
+
+    Nav.Grid.new(cells, {80, 80}, 0.1, {-4.0, -4.0}, closed?: true)
+  end
+
+  test "a near robot of which a wall hides a part need not be seen where that is" do
+    for {grid, verdict} <- [
+          {nil, :contradicted},
+          {wall(fn _y -> false end), :contradicted},
+          {wall(&(&1 > 0.0)), :unknown}
+        ],
+        do: assert(judge([robot(1, {1.2, 0.0})], [], Belief.new(@here), @here, grid) == verdict)
+  end
+
+  test "a robot that is seen past a wall contradicts only where it cannot be seen from anywhere near" do
+    grid = wall(&(abs(&1) < 0.4))
+    seen = [blob({1.6, 0.0})]
+    # By 0.3 m to either side, where a line past the wall needs 0.6 m.
+    unsure = Frame.reframe(Belief.new(@here), {4.0, 0.0}, 0.0, 0.0056)
+    assert judge([robot(1, {1.6, 0.0})], seen, unsure, @here, grid) == :consistent
+    assert judge([robot(1, {1.6, 0.0})], seen, Belief.new(@here), @here, grid) == :contradicted
   end
 
   test "a robot whose place is not known well may be seen anywhere about, or not at all" do

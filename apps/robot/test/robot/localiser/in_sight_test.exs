@@ -41,6 +41,31 @@ defmodule Robot.Localiser.InSightTest do
     assert :beside in keys(seen(marks, plan(), unsure))
   end
 
+  test "what is partly hidden, or may be, is not in sight as a whole" do
+    marks = for {key, at} <- @marks, do: mark(key, at)
+
+    whole = fn belief ->
+      Enum.filter(marks, &InSight.whole?(InSight.new(plan(), belief, belief.pose), &1))
+    end
+
+    assert keys(whole.(Belief.new(Pose.new(0, 0)))) == [:ahead, :here]
+    unsure = Frame.reframe(Belief.new(Pose.new(0, 0)), {4.0, 0.0}, 0.0, 0.09)
+    assert keys(whole.(unsure)) == [:here]
+    without = InSight.new(nil, unsure, unsure.pose)
+    assert Enum.all?(marks, &InSight.whole?(without, &1))
+  end
+
+  test "places farther off, as many standard deviations as are asked for" do
+    # Half a metre to either side by one of them.
+    unsure = Frame.reframe(Belief.new(Pose.new(0, 0)), {4.0, 0.0}, 0.0, 0.0156)
+    beside = mark(:beside, {3.0, 1.3})
+    seen? = fn sds -> InSight.seen?(InSight.new(plan(), unsure, unsure.pose, sds), beside) end
+    assert for(sds <- [[1.0], [1.25, 2.5]], do: seen?.(sds)) == [false, true]
+    # What one of them does not reach, many may.
+    sure = Frame.reframe(Belief.new(Pose.new(0, 0)), {4.0, 0.0}, 0.0, 0.0004)
+    assert InSight.seen?(InSight.new(plan(), sure, sure.pose, [1.0, 12.0]), beside)
+  end
+
   test "a robot at the same place, or in a wall, is an answer too" do
     for at <- [{0.0, 0.0}, {2.05, 3.0}, {9.0, 9.0}],
         do: assert(is_list(InSight.from([mark(:one, at)], plan(), {0.0, 0.0})))

@@ -36,7 +36,8 @@ defmodule Sim.Floorplan.Image do
          {:ok, picture} <- picture(file) do
       unknown = if grey == :wall, do: Picture.unknown(picture)
       walls = Picture.walls(picture, Picture.shades(unknown), size)
-      {:ok, fields} = plan(name, walls, size, {-width / 2, -height / 2})
+      known = if unknown, do: Picture.walls(picture, Picture.shades(nil), size), else: walls
+      {:ok, fields} = plan(name, {walls, known}, size, {-width / 2, -height / 2})
       {:ok, Map.put(fields, :grey, unknown)}
     end
   end
@@ -49,9 +50,12 @@ defmodule Sim.Floorplan.Image do
 
       with :ok <- large_enough(file, size),
            :ok <- around(file, description.origin, whole(size, description.origin)) do
-        walls = Picture.walls(picture, description.shades, size)
-        {walls, corner} = Turn.turn(walls, Picture.cell(), description.origin)
-        plan(file, walls, turned(size, walls, description.origin), corner)
+        [{walls, corner}, {known, corner}] =
+          for shades <- [description.shades, description.known],
+              walls = Picture.walls(picture, shades, size),
+              do: Turn.turn(walls, Picture.cell(), description.origin)
+
+        plan(file, {walls, known}, turned(size, walls, description.origin), corner)
       end
     end
   end
@@ -116,16 +120,20 @@ defmodule Sim.Floorplan.Image do
   defp picture(file, transparent \\ 255),
     do: file |> MapFile.picture(@most_cells, transparent) |> about()
 
-  # `{x, y}` is where the lower left corner of the walls lies.
-  defp plan(name, walls, {width, height} = size, {x, y}) do
+  # `known` are those of the walls that are surely there; `{x, y}` is where the lower left corner of the walls lies.
+  defp plan(name, {walls, known}, {width, height} = size, {x, y}) do
     {columns, rows} = Picture.cells(size)
     {w, right} = middle(columns, x, width)
     {h, up} = middle(rows, y, height)
-    field = walls |> surround({w, h}, {columns, rows}, {right, up}) |> Compute.field(w, h)
+    surround = &surround(&1, &2, {w, h}, {columns, rows}, {right, up})
+    cells = surround.(walls, 1)
     cell = Picture.cell()
     {left, low} = {(right - w / 2) * cell, (up - h / 2) * cell}
     room = {left, low, left + columns * cell, low + rows * cell}
-    {:ok, %{name: name, width: w, height: h, cell: cell, field: field, room: room}}
+    # Surely known walls are walls, too, so what is left of these is unknown.
+    unknown = if walls != known, do: :crypto.exor(cells, surround.(known, 0))
+    fields = %{name: name, width: w, height: h, cell: cell, room: room, unknown: unknown}
+    {:ok, Map.put(fields, :field, Compute.field(cells, w, h))}
   end
 
   # How many cells the plan needs along an axis, and how many of them come before the picture.
@@ -137,9 +145,9 @@ defmodule Sim.Floorplan.Image do
     {2 * half, half - before}
   end
 
-  # What the picture does not cover is wall.
-  defp surround(walls, {w, h}, {columns, rows}, {right, up}) do
-    fill = &:binary.copy(<<1>>, &1)
+  # What the picture does not cover is wall, and unknown.
+  defp surround(walls, outside, {w, h}, {columns, rows}, {right, up}) do
+    fill = &:binary.copy(<<outside>>, &1)
     {left, rest} = {fill.(right), fill.(w - right - columns)}
 
     IO.iodata_to_binary([

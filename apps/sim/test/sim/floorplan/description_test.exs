@@ -28,6 +28,41 @@ defmodule Sim.Floorplan.DescriptionTest do
       )
   end
 
+  test "what is not known is wall, and told apart from walls", %{tmp_dir: dir} do
+    # 205 is what map_server writes for it.
+    row = :binary.copy(<<0>>, 20) <> :binary.copy(<<205>>, 20) <> :binary.copy(<<254>>, 40)
+    File.write!(Path.join(dir, "floor.pgm"), "P5 80 60 255\n" <> :binary.copy(row, 60))
+    file = Path.join(dir, "map.yaml")
+
+    for {origin, {x, y}, beyond} <- [
+          {"[-2.0, -1.5, 0.0]", {1.0, 0.0}, nil},
+          {"[-1.0, -1.5, 0.0]", {1.0, 0.0}, {-2.0, 0.0}},
+          {"[1.5, -2.0, 1.5707963]", {0.0, 1.0}, nil}
+        ] do
+      File.write!(file, with_line("origin", "origin: #{origin}"))
+      {:ok, map} = Floorplan.open(file, 1)
+
+      # Where the picture's left edge lies: along its rows there are 1 m of wall, 1 m unknown and 2 m of floor.
+      [left, low] =
+        origin
+        |> String.trim("[")
+        |> String.split(",")
+        |> Enum.take(2)
+        |> Enum.map(&String.to_float(String.trim(&1)))
+
+      {dx, dy} = if x == 1.0, do: {0.0, 1.0}, else: {-1.0, 0.0}
+      at = fn along -> {left + along * x + 1.2 * dx, low + along * y + 1.2 * dy} end
+
+      for {along, wall?, unknown?} <- [{0.5, true, false}, {1.5, true, true}, {2.5, false, false}] do
+        place = at.(along)
+        assert {origin, along, Floorplan.wall?(map, place)} == {origin, along, wall?}
+        assert {origin, along, Floorplan.unknown?(map, place)} == {origin, along, unknown?}
+      end
+
+      if beyond, do: assert(Floorplan.wall?(map, beyond) and Floorplan.unknown?(map, beyond))
+    end
+  end
+
   test "places are counted from the origin of the description", %{tmp_dir: dir} do
     File.write!(Path.join(dir, "floor.pgm"), picture())
     file = Path.join(dir, "map.yaml")

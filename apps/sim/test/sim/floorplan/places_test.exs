@@ -229,6 +229,15 @@ defmodule Sim.Floorplan.PlacesTest do
     for seed <- 1..3 do
       map = map(dir, {18, 14}, shade)
       assert map.grey == 178
+      # In the court and outside; not the walls, nor the floor.
+      for {place, unknown?} <- [
+            {{0.0, 0.0}, true},
+            {{8.5, 0.0}, true},
+            {{-3.05, 0.0}, false},
+            {{5.0, 0.0}, false}
+          ],
+          do: assert({place, Floorplan.unknown?(map, place)} == {place, unknown?})
+
       {:ok, {x, y} = landmark, poses} = choose(map, 5, seed)
       refute box?(x, y, {-3.1, -2.1, 3.1, 2.1})
       assert box?(x, y, {-7.0, -5.0, 7.0, 5.0})
@@ -238,7 +247,7 @@ defmodule Sim.Floorplan.PlacesTest do
     end
 
     map = map(dir, {18, 14}, shade, grey: :floor)
-    assert map.grey == nil
+    assert {map.grey, map.unknown} == {nil, nil}
     assert {:ok, place, _poses} = choose(map, 5)
     assert place == {0.0, 0.0}
   end
