@@ -8,8 +8,8 @@ defmodule Robot.Localiser.Silhouettes do
   border, in which none can be identified (`Robot.Localiser.Matching`). So places along the
   direction of greatest uncertainty are tried: for each, the columns of the picture that robots
   would fill are computed, and the wrong ones are counted. A place is accepted if few columns are
-  wrong and no place elsewhere is nearly as good. A robot that is unsure by more than a metre is left where it is: along a line so
-  long, one blob fits somewhere. By a floor plan, a robot that walls hide fills no columns.
+  wrong and no place elsewhere is nearly as good. Among walls a robot that is unsure by more than a metre is left where it is:
+  along a line so long, one blob fits somewhere. By a floor plan, a robot that walls hide fills no columns.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Columns, Glance, InSight}
@@ -19,7 +19,7 @@ defmodule Robot.Localiser.Silhouettes do
 
   # With a standard deviation below this (metres) no search is needed.
   @sure 0.2
-  # With a greater one a line of places is not enough, and too many of them fit.
+  # With a greater one, among walls that may hide robots, too many places fit.
   @vague 1.0
   # The search covers this many standard deviations to each side, in steps of about this many
   # metres, but at most this many steps.
@@ -53,7 +53,7 @@ defmodule Robot.Localiser.Silhouettes do
     {worst, _least, direction} = Belief.spread(belief)
     seen = Columns.seen(percept.detections.blobs, Enum.map(robots, & &1.colour))
 
-    if worst > @sure and worst <= @vague and not Columns.empty?(seen),
+    if worst > @sure and (percept.grid == nil or worst <= @vague) and not Columns.empty?(seen),
       do: fit(belief, robots, percept, back, seen, {worst, direction}),
       else: belief
   end
