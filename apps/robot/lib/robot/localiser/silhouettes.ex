@@ -8,8 +8,8 @@ defmodule Robot.Localiser.Silhouettes do
   border, in which none can be identified (`Robot.Localiser.Matching`). So places along the
   direction of greatest uncertainty are tried: for each, the columns of the picture that robots
   would fill are computed, and the wrong ones are counted. A place is accepted if few columns are
-  wrong and no place elsewhere is nearly as good. Among walls a robot that is unsure by more than a metre is left where it is:
-  along a line so long, one blob fits somewhere. By a floor plan, a robot that walls hide fills no columns.
+  wrong and no place elsewhere is nearly as good. A robot that is unsure of its heading by half a radian is left where
+  it is: along a line so long, one blob fits somewhere. By a floor plan, a robot that walls hide fills no columns.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief, Columns, Glance, InSight}
@@ -19,8 +19,8 @@ defmodule Robot.Localiser.Silhouettes do
 
   # With a standard deviation below this (metres) no search is needed.
   @sure 0.2
-  # With a greater one, among walls that may hide robots, too many places fit.
-  @vague 1.0
+  # With a greater one of the heading (radians) its error is no longer in proportion to that of the place.
+  @turned 0.5
   # The search covers this many standard deviations to each side, in steps of about this many
   # metres, but at most this many steps.
   @reach 2.5
@@ -51,9 +51,10 @@ defmodule Robot.Localiser.Silhouettes do
   @spec align(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: Belief.t()
   def align(belief, robots, %Percept{} = percept, %Pose{} = back) do
     {worst, _least, direction} = Belief.spread(belief)
+    {_worst, _least, heading} = Belief.sd(belief)
     seen = Columns.seen(percept.detections.blobs, Enum.map(robots, & &1.colour))
 
-    if worst > @sure and (percept.grid == nil or worst <= @vague) and not Columns.empty?(seen),
+    if worst > @sure and heading <= @turned and not Columns.empty?(seen),
       do: fit(belief, robots, percept, back, seen, {worst, direction}),
       else: belief
   end
