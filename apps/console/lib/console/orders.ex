@@ -135,11 +135,10 @@ defmodule Console.Orders do
     kept
   end
 
-  defp next(%{running: nil, waiting: [order | waiting]} = s) do
-    if order.kind != :question and
-         Enum.any?(s.stops, &match?({_ref, {%{key: :estop}, _again}}, &1)),
-       do: s,
-       else: next(order, %{s | waiting: waiting})
+  defp next(%{running: nil, waiting: [first | _]} = s) do
+    stopping? = Enum.any?(s.stops, &match?({_ref, {%{key: :estop}, _again}}, &1))
+    order = if stopping?, do: Enum.find(s.waiting, &(&1.kind == :question)), else: first
+    if order, do: next(order, %{s | waiting: List.delete(s.waiting, order)}), else: s
   end
 
   defp next(s), do: s

@@ -80,6 +80,8 @@ defmodule Console.OrdersTest do
     line(orders, "reset")
     answer(stop)
     assert_receive {:answer, "stop mag2", {:ok, "done"}}
+    Orders.give(orders, %{question | given_us: now_us()})
+    assert_receive {:answer, "help", {:ok, [_line | _more]}}
     refute_received {:told, :reset, _ref}
 
     answer(estop)

@@ -137,10 +137,14 @@ defmodule Missions.Landmark.Shape do
   end
 
   # The ladder takes the first spacing below the one that is asked for.
-  defp wanted(%{closest?: true}, {kind, spacing}),
-    do: {kind, min(spacing, Float.round(Formation.least_spacing() + @step, 3))}
+  defp wanted(%{closest?: true}, {kind, _spacing}),
+    do: {kind, Float.round(Formation.least_spacing() + @step, 3)}
 
   defp wanted(_shape, formation), do: formation
+
+  # Where the shape has no room with the least spacing, it stays.
+  defp rungs(%{closest?: true, squeeze: 2}, %{percept: %{grid: grid}}) when grid != nil,
+    do: [:closer, :asked, :turned, :column, :cluster]
 
   defp rungs(%{squeeze: squeeze}, mission),
     do: if(squeeze >= last(mission), do: [:cluster], else: Enum.drop(Ladder.rungs(), squeeze))

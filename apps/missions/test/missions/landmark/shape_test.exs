@@ -81,6 +81,29 @@ defmodule Missions.Landmark.ShapeTest do
     assert stand.(closer, unsure, 26..90) == %{closer | unsure_ms: 26_000}
   end
 
+  test "among walls, too; but a ring, and what is as close as may be already, stay" do
+    cells = :binary.copy(<<0>>, 200 * 200)
+    plan = Grid.plan(cells, {200, 200}, 0.1, {-10.0, -10.0})
+    unsure = for id <- @ids, do: {id, if(id == :mag5, do: [unsure: true], else: [in_place: true])}
+
+    stand = fn formation ->
+      for s <- 10..60, reduce: Shape.new() do
+        shape ->
+          mission = mission(unsure, 1_000 * s)
+          mission = put_in(%{mission | formation: formation}.percept.grid, plan)
+          Shape.update(shape, mission, 1.6)
+      end
+    end
+
+    assert %{formation: {:column, 0.8}, rung: :closer, spots: [_, _, _, _]} =
+             stand.({:column, 1.0})
+
+    assert %{formation: {:column, 0.8}, rung: :closer} = stand.({:column, 0.85})
+
+    for formation <- [{:circle, 1.0}, {:column, 0.8}],
+        do: assert(%{formation: ^formation, rung: :asked, squeeze: 0} = stand.(formation))
+  end
+
   test "whoever does not get to its place of a cluster is given another one, and nobody else moves" do
     before = run([claims(@ids)])
     later = run([claims(@ids), claims([:mag3]) |> rest()])

@@ -202,10 +202,8 @@ defmodule Mcap.FileWriter.Output do
   end
 
   defp turn(t) do
-    number = t.number + 1
-
     with {:ok, t} <- finish(t),
-         {:ok, file} <- Disk.create(Path.join(t.path, Folder.name(number))) do
+         {:ok, file, number, _files} <- begin(t.path) do
       {writer, head} = Writer.next(t.writer)
 
       {notes, writer} =

@@ -91,8 +91,8 @@ defmodule Robot.Localiser.MonteCarlo do
   @typedoc """
   `held` are the particles of the place where the robot is, as far as it knows, `nil` for none; `search` those of a lost robot
   everywhere else; `rivals` are the other places that fit. `at` is the odometry at the last look, whose `number` it is; `last` is
-  the odometry since, `turned` the sum of all angles since (radians), `way` the way since the place is held, or since it did not fit
-  before it was shown to (metres). `shown` counts good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
+  the odometry since, `turned` the sum of all angles since (radians), `way` the way since the place is held, or since it did not
+  fit (metres). `shown` counts good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
   rival, and those of another one with rivals.
   """
   @type t :: %__MODULE__{
@@ -271,12 +271,11 @@ defmodule Robot.Localiser.MonteCarlo do
     share = fits / counting
 
     {better?, good?} = {share < @doubtful and better?(held, look, percept), share >= @good}
-    open? = filter.shown < @shown and not good?
 
     %{
       filter
       | held: held,
-        way: if(open?, do: 0.0, else: filter.way),
+        way: if(good?, do: filter.way, else: 0.0),
         slow: mean(filter.slow, share, @slow),
         fast: mean(filter.fast, share, @fast),
         shown: shown(filter.shown, good?),

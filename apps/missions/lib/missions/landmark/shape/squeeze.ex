@@ -4,6 +4,7 @@ defmodule Missions.Landmark.Shape.Squeeze do
   # claim, and which places are barred; `Missions.Landmark.Shape` then chooses another. Pure.
   alias Hal.Pose
   alias Missions.Landmark
+  alias Swarm.Formation
   alias Missions.Landmark.{Claim, Shape}
 
   # How long followers have to take what they were given, places of a cluster longer.
@@ -60,8 +61,12 @@ defmodule Missions.Landmark.Shape.Squeeze do
 
   defp unsure?(%{rung: rung, closest?: closest?, unsure_ms: since_ms}, mission) do
     rung not in [nil, :cluster] and not closest? and since_ms != nil and
-      mission.now_ms - since_ms >= @unsure_ms
+      mission.now_ms - since_ms >= @unsure_ms and closer?(mission.formation, mission.percept.grid)
   end
+
+  # Whether the shape can be had with less spacing; the ladder has no ring with less.
+  defp closer?({:circle, _spacing}, grid) when grid != nil, do: false
+  defp closer?({_kind, spacing}, _grid), do: spacing > Formation.least_spacing() + 1.0e-6
 
   # Two steps before the last, the shape is the requested one with less spacing.
   defp closest(shape, mission, last),

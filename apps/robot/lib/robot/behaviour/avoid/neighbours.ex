@@ -59,7 +59,8 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   defp unsure?(%{uncertainty: %{radius: radius}, sonar: [_ | _]}), do: radius > @unsure
   defp unsure?(_percept), do: false
 
-  # One sonar may fail, or miss an echo: two must look at it, and hear nothing up to well behind its front.
+  # One sonar may fail, or miss an echo: two must hear nothing up to well behind its front. A round body sends the echo back
+  # along the line to its middle, so only those count that look at that.
   defp unheard?(%{at: at, radius: radius}, %{pose: pose, profile: profile, sonar: ranges}) do
     echoes =
       for {mount, range} <- Enum.zip(profile.sonars, ranges),
@@ -67,8 +68,7 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
           from = Pose.compose(pose, mount),
           distance = Pose.distance(from, at),
           distance < @heard and distance > radius,
-          half = :math.asin(radius / distance) / 1.5,
-          abs(Pose.bearing(from, at)) < profile.sonar_cone / 2 + half,
+          abs(Pose.bearing(from, at)) < profile.sonar_cone / 2,
           do: range > distance - radius + @beyond
 
     match?([_, _ | _], echoes) and Enum.all?(echoes)
