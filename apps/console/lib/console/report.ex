@@ -149,11 +149,16 @@ defmodule Console.Report do
 
   defp seen(%{seen: %{area_m2: area_m2, share: share, walls: walls}}) do
     " Seen: #{Format.decimals(share * area_m2, 0)} of the #{Format.decimals(area_m2, 0)} m² " <>
-      "that a robot can come to (#{Format.decimals(100 * share, 1)} %). " <>
-      "Of the walls on the map #{Format.decimals(100 * walls, 0)} % are within 0.2 m of true ones."
+      "that a robot can come to (#{Format.decimals(100 * share, 1)} %)." <> walls(walls)
   end
 
   defp seen(_without_a_map), do: ""
+
+  defp walls(nil), do: ""
+
+  defp walls(share),
+    do:
+      " Of the walls on the map #{Format.decimals(100 * share, 0)} % are within 0.2 m of true ones."
 
   # The one that was asked for, unless there was no room for it.
   defp shape(formation, stages) do

@@ -83,6 +83,14 @@ defmodule Console.ReportTest do
     refute hd(Report.summary(result, false, 2.0)) =~ "Blocked"
   end
 
+  test "the walls of a map are told of, if there are any" do
+    result = result("")
+    told = &hd(Report.summary(Map.put(result, :seen, &1), false, 2.0))
+    seen = %{area_m2: 80.0, share: 0.5, walls: 0.25}
+    assert told.(seen) =~ ~r/ Of the walls on the map 25 % are within 0.2 m of true ones\.$/
+    assert told.(%{seen | walls: nil}) =~ ~r/ Seen: 40 of the 80 m² .+ \(50.0 %\)\.$/
+  end
+
   test "the summary says who is still on the way" do
     result = result("")
     robots = Enum.map(result.fleet, &%{&1 | state: :follow, alive: &1.name != :mag1})

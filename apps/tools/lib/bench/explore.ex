@@ -17,8 +17,8 @@ defmodule Bench.Explore do
 
   @typedoc """
   When 95 % of the area were seen, and when all robots said that they are ready (seconds, `nil` for never); the share that
-  was seen in the end; how many of the map's cells of wall are within 0.3 m of a true wall, and how many farther than 0.2 m from any; how far the worst robot was
-  from where it believed to be at the end.
+  was seen in the end; how many of the map's cells of wall are within 0.3 m of a true wall, and how many farther than
+  0.2 m from any (`nil` of a map without a wall); how far the worst robot was from where it believed to be at the end.
   """
   @type measured :: %{
           map: String.t(),
@@ -28,8 +28,8 @@ defmodule Bench.Explore do
           seen_s: float() | nil,
           ready_s: float() | nil,
           share: float(),
-          walls: float(),
-          wrong: float(),
+          walls: float() | nil,
+          wrong: float() | nil,
           off_m: float(),
           collisions: non_neg_integer()
         }
@@ -70,6 +70,7 @@ defmodule Bench.Explore do
 
   defp measure(trial, seen, plan, options) do
     map = Coverage.fullest(trial)
+    right = Coverage.walls(map, plan, @wrong_m)
     ready? = Trial.formed?(trial)
 
     off =
@@ -87,7 +88,7 @@ defmodule Bench.Explore do
       ready_s: if(ready?, do: trial.at_ms / 1_000),
       share: seen.share,
       walls: Coverage.walls(map, plan, @near_m),
-      wrong: 1.0 - Coverage.walls(map, plan, @wrong_m),
+      wrong: right && 1.0 - right,
       off_m: Enum.max(off),
       collisions: Trial.result(trial).collisions
     }

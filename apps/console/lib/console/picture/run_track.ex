@@ -9,8 +9,8 @@ defmodule Console.Picture.RunTrack do
 
   @step_m 0.02
   @stands_m 0.1
-  # One that has moved within so long (ms) is under way.
-  @stands_ms 1_000
+  # One that has moved within so long (ms) is under way: a slow one, of 0.05 m/s, needs 2 s for 10 cm.
+  @stands_ms 5_000
 
   @enforce_keys [:first, :last, :ways, :stood, :landmark, :errors, :marks]
   defstruct @enforce_keys

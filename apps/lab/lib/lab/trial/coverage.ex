@@ -96,8 +96,8 @@ defmodule Lab.Trial.Coverage do
 
   defp known(cells), do: for(<<state <- cells>>, state != 0, reduce: 0, do: (n -> n + 1))
 
-  @doc "The share of the map's cells of wall that are within so many metres of a true wall; 0.0 of a map without a wall."
-  @spec walls(MapFile.Writer.raster(), Grid.t(), near :: float()) :: float()
+  @doc "The share of the map's cells of wall that are within so many metres of a true wall; `nil` of a map without a wall."
+  @spec walls(MapFile.Writer.raster(), Grid.t(), near :: float()) :: float() | nil
   def walls(map, plan, near) do
     true? =
       for {2, k} <- map.cells |> :binary.bin_to_list() |> Enum.with_index() do
@@ -106,14 +106,15 @@ defmodule Lab.Trial.Coverage do
         Grid.clearance(plan, {x, y}) <= near
       end
 
-    Enum.count(true?, & &1) / max(length(true?), 1)
+    if true? != [], do: Enum.count(true?, & &1) / length(true?)
   end
 
   @doc """
   The area of a run that began there, the share of it that was seen, and that of the map's walls that are within 0.2 m of true
-  ones; `nil` of a mission that makes no map.
+  ones, `nil` of a map without a wall; `nil` of a mission that makes no map.
   """
-  @spec of(Trial.t(), [Pose.point()]) :: %{area_m2: float(), share: float(), walls: float()} | nil
+  @spec of(Trial.t(), [Pose.point()]) ::
+          %{area_m2: float(), share: float(), walls: float() | nil} | nil
   def of(trial, starts) do
     with %{} = map <- fullest(trial) do
       area = area(trial.map, starts)

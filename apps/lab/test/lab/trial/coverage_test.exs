@@ -27,6 +27,14 @@ defmodule Lab.Trial.CoverageTest do
         do: assert(Coverage.share(area, known(1, far, {-5, 5})) == 0.0)
   end
 
+  test "the share of walls that are there; none of a map without a wall" do
+    {:ok, map} = Sim.Floorplan.open("hall", 1)
+    plan = Sim.Floorplan.grid(map)
+    assert Coverage.walls(known(1, {-5, 5}, {-5, 5}), plan, 0.2) == nil
+    assert Coverage.walls(known(2, {-5, 5}, {-5, 5}), plan, 0.2) == 0.0
+    assert Coverage.walls(known(2, {-5, 5}, {-5, 5}), plan, 100.0) == 1.0
+  end
+
   test "a mission that makes no map has seen nothing of it" do
     {:ok, trial} = Lab.Trial.new(%{robots: [:mag1], landmark: :none, mission: :patrol})
     assert Coverage.of(trial, [{0.0, 0.0}]) == nil

@@ -4,8 +4,8 @@ defmodule Robot.Localiser.InSight do
   Pure. It costs several lines over the grid for each robot, so it is asked last.
 
   A robot counts as hidden if no line from where this robot may be, the estimate and so many standard deviations to both sides of
-  it along the direction of its greatest uncertainty, leads to its middle or to either side of it; as in sight as a whole if all
-  lines do.
+  it along the direction of its greatest uncertainty, where no wall is between, leads to its middle or to either side of it; as
+  in sight as a whole if all lines do.
   """
   alias Hal.Pose
   alias Robot.Localiser.{Anchors, Belief}
@@ -31,7 +31,8 @@ defmodule Robot.Localiser.InSight do
     {worst, _least, direction} = Belief.spread(belief)
     {dx, dy} = {worst * :math.cos(direction), worst * :math.sin(direction)}
     sides = for sd <- sds, sd * worst > @sure, k <- [sd, -sd], do: {x + k * dx, y + k * dy}
-    %__MODULE__{grid: grid, places: [{x, y} | sides]}
+    free = Enum.filter(sides, &Grid.free_line?(grid, {x, y}, &1, @beside))
+    %__MODULE__{grid: grid, places: [{x, y} | free]}
   end
 
   @doc "Whether a mark may be in sight; always without a plan."

@@ -66,6 +66,17 @@ defmodule Robot.Localiser.InSightTest do
     assert InSight.seen?(InSight.new(plan(), sure, sure.pose, [1.0, 12.0]), beside)
   end
 
+  test "a place behind a wall is not one where the robot may be" do
+    # In front of the wall and 3 m beside its door; one standard deviation of 1.2 m across it.
+    unsure = Frame.reframe(Belief.new(Pose.new(1, 3)), {1.0, 7.0}, 0.0, 0.09)
+    {_worst, _least, direction} = Belief.spread(unsure)
+    assert abs(:math.cos(direction)) > 0.99
+    behind = [mark(:behind, {3.5, 3.0})]
+    assert seen(behind, plan(), unsure) == []
+    assert seen(behind, plan(), %{unsure | pose: Pose.new(2.5, 3)}) == behind
+    assert keys(seen([mark(:before, {0.0, 3.0})], plan(), unsure)) == [:before]
+  end
+
   test "a robot at the same place, or in a wall, is an answer too" do
     for at <- [{0.0, 0.0}, {2.05, 3.0}, {9.0, 9.0}],
         do: assert(is_list(InSight.from([mark(:one, at)], plan(), {0.0, 0.0})))

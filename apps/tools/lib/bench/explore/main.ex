@@ -69,8 +69,8 @@ defmodule Bench.Explore.Main do
       share(median(seen), median(for one <- alone, do: one.seen_s)),
       some |> Enum.map(& &1.ready_s) |> median() |> seconds(),
       percent(some |> Enum.map(& &1.share) |> Enum.min()),
-      percent(some |> Enum.map(& &1.walls) |> median()),
-      percent(some |> Enum.map(& &1.wrong) |> median()),
+      percent(median(for %{walls: walls} when walls != nil <- some, do: walls)),
+      percent(median(for %{wrong: wrong} when wrong != nil <- some, do: wrong)),
       Format.decimals(some |> Enum.map(& &1.off_m) |> Enum.max(), 2),
       some |> Enum.map(& &1.collisions) |> Enum.sum()
     ]
@@ -87,6 +87,7 @@ defmodule Bench.Explore.Main do
 
   defp share(_some, _alone), do: "–"
 
+  defp percent(nil), do: "–"
   defp percent(share), do: "#{Format.decimals(100 * share, 1)} %"
 
   defp table do
