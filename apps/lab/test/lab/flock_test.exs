@@ -112,12 +112,12 @@ defmodule Lab.FlockTest do
         map: "rooms:91",
         seed: 901,
         plan: :known,
-        duration_s: 240,
+        duration_s: 360,
         mission: {:flock, course: course}
       )
 
     trial =
-      Enum.reduce_while(1..2_400, trial, fn _n, trial ->
+      Enum.reduce_while(1..3_600, trial, fn _n, trial ->
         trial = Trial.step(trial)
         {if(Trial.done?(trial), do: :halt, else: :cont), trial}
       end)

@@ -324,23 +324,21 @@ defmodule Missions.Explore do
   defp says(%{target: %{far: far}} = mission),
     do: "#{area(mission)} explored, going to a frontier #{Float.round(far, 1)} m away"
 
+  # A status has room for 80 characters.
   defp left(%{aside: aside, now_ms: now_ms, unknown: unknown} = mission) do
-    frontiers =
-      case Enum.count(aside, fn {_place, until_ms} -> until_ms > now_ms end) do
-        0 -> "no frontier is left"
-        count -> "no frontier is left but #{count} that it did not reach"
+    count = Enum.count(aside, fn {_place, until_ms} -> until_ms > now_ms end)
+    frontiers = if count > 0, do: ["#{count} frontiers left"], else: []
+
+    doubt =
+      cond do
+        unknown > @unknown -> ["#{round(unknown * 100)} % of edge unknown"]
+        closed?(mission) -> ["#{length(mission.looked)} walls in doubt"]
+        true -> []
       end
 
-    cond do
-      unknown > @unknown ->
-        "#{frontiers}; it has no room to get to the #{round(unknown * 100)} % of its edge that are unknown"
-
-      closed?(mission) ->
-        "#{frontiers}; echoes closed #{length(mission.looked)} ways, too many to be sure that all of them are walls"
-
-      true ->
-        frontiers
-    end
+    if frontiers ++ doubt == [],
+      do: "no frontier is left",
+      else: Enum.join(frontiers ++ doubt, ", ")
   end
 
   defp closed?(%{looked: looked, map: map}),

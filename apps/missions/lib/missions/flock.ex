@@ -67,8 +67,7 @@ defmodule Missions.Flock do
   `plan` is the course in 28 bits, so that only robots with the same one are a flock; `leg` is how far it has come, `done_ms` since
   when this leg seems done; `pace` is the share of the speed with which the flock goes on, `middle` that of the members, `near` the
   number of the robot's neighbours, `velocity` what it drives with. `stood` is where members stand, `why` what keeps the flock from
-  coming together or to its point, and `to` where it goes for that by its own way, `nil` if none leads there, as found at `why_ms`;
-  `go` numbers the goals of its own way.
+  coming together or to its point, `to` where its own way for that leads (`nil`: nowhere), both of `why_ms`; `go` numbers its goals.
   """
   @type t :: %__MODULE__{
           me: atom(),
@@ -131,8 +130,7 @@ defmodule Missions.Flock do
   end
 
   @impl Robot.Mission
-  def halted(mission),
-    do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
+  def halted(mission), do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
@@ -184,7 +182,8 @@ defmodule Missions.Flock do
   defp last(mission), do: map_size(mission.course) + 1
   defp there?(mission), do: mission.leg == last(mission) and mission.together?
 
-  defp on_leg(mission, leg), do: %{mission | leg: leg, done_ms: nil, to: nil, why_ms: nil}
+  defp on_leg(%{stood: stood} = mission, leg),
+    do: %{mission | leg: leg, done_ms: nil, to: nil, why_ms: nil, stood: Map.delete(stood, nil)}
 
   defp point(%{course: course}) when course == %{}, do: nil
   defp point(mission), do: mission.course[mission.leg |> max(1) |> min(map_size(mission.course))]
@@ -194,7 +193,7 @@ defmodule Missions.Flock do
        when looked_ms != nil and now_ms - looked_ms < @look_ms,
        do: mission
 
-  defp look(%{together?: before, now_ms: now_ms} = mission, agents, percept) do
+  defp look(%{together?: before, now_ms: now_ms} = mission, agents, %{grid: grid} = percept) do
     members = [{mission.me, Pose.point(percept.pose)} | Enum.map(agents, &{&1.id, &1.at})]
     middle = Members.middle(members)
     groups = Members.groups(members, Field.reach(mission.spacing))
@@ -206,12 +205,12 @@ defmodule Missions.Flock do
       | looked_ms: now_ms,
         together?: together?,
         middle: middle,
-        stood: Apart.stood(mission.stood, [{nil, middle} | members], now_ms)
+        stood: Apart.stood(mission.stood, [{nil, middle} | members], mission.speed, now_ms)
     }
 
     waits? = not together? and waits?(mission, groups, percept)
     mission = why(%{mission | pace: pace(together?, close?, waits?)}, before, groups, percept)
-    %{mission | done_ms: if(done?(mission), do: mission.done_ms || now_ms)}
+    %{mission | done_ms: if(done?(mission, grid), do: mission.done_ms || now_ms)}
   end
 
   # The group with the member that is nearest to the point waits for the others that it sees, which go on. Those behind walls come
@@ -240,17 +239,19 @@ defmodule Missions.Flock do
     end
   end
 
-  defp done?(%{leg: 0} = mission),
+  defp done?(%{leg: 0} = mission, _grid),
     do: mission.together? and mission.now_ms - mission.since_ms >= @first_ms
 
-  defp done?(mission), do: mission.leg < last(mission) and near?(mission, point(mission))
+  defp done?(mission, grid),
+    do: mission.leg < last(mission) and near?(mission, point(mission), grid)
 
-  # Where walls leave no room for the flock all about the point, it is there when it has come to rest with the point among it.
-  defp near?(_mission, nil), do: true
+  defp near?(_mission, nil, _grid), do: true
 
-  defp near?(%{middle: middle} = mission, point) do
+  defp near?(%{together?: together?, middle: middle, stood: stood} = mission, point, grid) do
+    flock = %{spacing: mission.spacing, radius: radius(mission)}
+
     Pose.distance(middle, point) < @there or
-      (mission.together? and Apart.rest?(mission.stood, point, mission.spacing, mission.now_ms))
+      (together? and Apart.rest?(stood, point, flock, grid, mission.now_ms))
   end
 
   defp count_on(%{done_ms: nil} = mission), do: {mission, []}
@@ -335,15 +336,25 @@ defmodule Missions.Flock do
     }
   end
 
-  defp says(mission) do
-    way =
-      case phase(mission) do
-        :gather -> "gathers"
-        :flock -> "on the way to point #{mission.leg} of #{map_size(mission.course)}"
-        :arrived -> "arrived"
-      end
+  # A status has room for 80 characters: why it does not get on comes first.
+  defp says(%{why: nil, together?: together?} = mission) do
+    way = if phase(mission) == :flock, do: "on the way #{way(mission)}", else: way(mission)
 
-    together = if mission.together?, do: " together", else: ", not together"
-    way <> ", " <> many(mission) <> together <> if(mission.why, do: ": #{mission.why}", else: "")
+    "#{way}, #{many(mission)}#{if together?, do: " together", else: ", not together"}#{off(mission)}"
   end
+
+  defp says(mission), do: "#{mission.why}; #{way(mission)}"
+
+  # Where walls leave no room for it round its last point.
+  defp off(%{together?: true, middle: middle} = mission) do
+    point = point(mission)
+    far = if there?(mission) and point != nil, do: Pose.distance(middle, point), else: 0.0
+    if far >= @there, do: ", its middle #{Float.round(far, 1)} m from the point"
+  end
+
+  defp off(_mission), do: nil
+
+  defp way(%{leg: 0}), do: "gathers"
+  defp way(%{leg: leg, course: all}) when leg > map_size(all), do: "arrived"
+  defp way(%{leg: leg, course: all}), do: "to point #{leg} of #{map_size(all)}"
 end

@@ -177,10 +177,30 @@ defmodule Missions.ExploreTest do
     assert %{formed: false, phase: :explored} = runner.claim
 
     assert runner.claim.says =~
-             ~r/; it has no room to get to the \d\d % of its edge that are unknown; later looks confirmed \d+ % of the walls that it heard$/
+             ~r/^1 m² explored, \d\d % of edge unknown, walls \d+ % confirmed$/
 
     assert [%{says: "says that 1 m² are explored" <> _}] =
              for({:stage, :explored, facts} <- effects, do: facts)
+  end
+
+  test "what it says of much that is left fits a status" do
+    {runner, _effects} = ticks(explore(), 0..60, Pose.new(0, 0), sonar: List.duplicate(0.6, 16))
+
+    aside = for x <- 1..12, do: {{50.0 + x, 0.0}, 60_000}
+    map = %{runner.mission.map | free: 123_400}
+
+    says = fn fields ->
+      mission = struct!(%{runner.mission | aside: aside, map: map, planned_ms: 6_000}, fields)
+      {runner, _effects} = ticks(%{runner | mission: mission}, 61..61, Pose.new(0, 0))
+      runner.claim.says
+    end
+
+    good = ", walls 100 % confirmed"
+    unknown = says.(unknown: 0.3, good: good)
+    assert unknown =~ ~r/^1234 m² explored, 12 frontiers left, 30 % of edge unknown, walls 100/
+    doubt = says.(unknown: 0.0, good: good, looked: List.duplicate({0.0, 0.0}, 127))
+    assert doubt =~ ~r/, 12 frontiers left, 127 walls in doubt, walls 100 % confirmed$/
+    for says <- [unknown, doubt], do: assert(String.length(says) <= 80, says)
   end
 
   test "a frontier that it comes no nearer to is left alone, and tried once more" do

@@ -2,7 +2,7 @@ defmodule Missions.FlockTest do
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Options, Pose, Profile, Twist}
   alias Missions.Flock
-  alias Missions.Flock.{Apart, Field, Members}
+  alias Missions.Flock.{Apart, Field, Members, Sight}
   alias Robot.Mission.{Letter, Runner}
   alias Robot.Percept
   doctest Apart
@@ -180,8 +180,7 @@ defmodule Missions.FlockTest do
     assert vx > 0.01
     assert {"on the way to point 2 of 2, 3 robots together", 0.5, _slower} = go.(-1.5)
 
-    assert {"on the way to point 2 of 2, 3 robots, not together: mag3 is 2.0 m from mag1", +0.0,
-            _waits} = go.(-2.0)
+    assert {"mag3 is 2.0 m from mag1; to point 2 of 2", +0.0, _waits} = go.(-2.0)
   end
 
   # 8 x 4 m with a wall across the middle, whose door has so many cells of 10 cm; its lower left corner is at -4, -2.
@@ -222,15 +221,15 @@ defmodule Missions.FlockTest do
     end
 
     assert says.([{2, 0}], 0, %{}) ==
-             "gathers, 1 robot together: no way to 2.0,0.0: no way leads there"
+             "no way to 2.0,0.0: no way leads there; gathers"
 
     assert says.([{0, 0}], 11, %{}) ==
-             "gathers, 1 robot together: no way to 0.0,0.0: there is a wall"
+             "no way to 0.0,0.0: there is a wall; gathers"
 
     peers = %{mag2: peer(2.0, 0.0, 500)}
-    apart = "gathers, 2 robots, not together: mag2 is 4.0 m from mag1"
-    assert says.([{-2, 0}], 11, peers) == apart <> ", a wall between them"
-    assert says.([{-2, 0}], 0, peers) == apart <> ", no way between them"
+    apart = "mag2 is 4.0 m from mag1"
+    assert says.([{-2, 0}], 11, peers) == apart <> ", a wall between; gathers"
+    assert says.([{-2, 0}], 0, peers) == apart <> ", no way between; gathers"
   end
 
   test "those that are behind go on while the first wait, and one that stands is told of" do
@@ -249,7 +248,69 @@ defmodule Missions.FlockTest do
     runner = Enum.reduce(1..24, behind, &go.(&2, 600 + 500 * &1))
 
     assert runner.claim.says =~
-             ~r/not together: mag2 is 4.0 m from mag1, and has stood for 1\d s$/
+             ~r/^mag2 is 4.0 m from mag1, stood 1\d s; to point 2 of 2$/
+  end
+
+  test "the longest that it says fits a status" do
+    options = [course: for(x <- 1..64, do: {x, 0})]
+    told = letter(options, leg: 64)
+    {runner, _effects} = tick(flock(options), 0)
+
+    runner =
+      Enum.reduce(1..240, runner, fn n, runner ->
+        runner = hear(runner, :magellan12, told)
+        peers = %{magellan12: peer(0.0, 12.3, 500 * n)}
+        elem(tick(runner, 500 * n, peers, Pose.new(0, 0), nil), 0)
+      end)
+
+    assert runner.claim.says == "magellan is 12.3 m from mag1, stood 115 s; to point 64 of 64"
+    # With what lies between.
+    assert String.length(runner.claim.says <> ", no way between") <= 80
+  end
+
+  test "a flock that waits, or is slow, on its way past the point's reach is not at the point" do
+    # In the open, one member nearer than the spacing, the middle beyond the flock's radius.
+    options = [course: [{0, 0}, {9, 0}, {12, 0}]]
+
+    wait = fn options, xs ->
+      told = letter(options, leg: 2)
+      {runner, _effects} = tick(flock(options), 0)
+
+      Enum.reduce(1..40, runner, fn n, runner ->
+        runner = Enum.reduce(Map.keys(xs), runner, &hear(&2, &1, told))
+        peers = Map.new(xs, fn {id, {x, v}} -> {id, peer(x + v * n / 2, 0.0, 500 * n)} end)
+        elem(tick(runner, 500 * n, peers), 0)
+      end).mission.leg
+    end
+
+    row = fn last -> for n <- 1..last, into: %{}, do: {:"mag#{n + 1}", {1.2 * n, 0.0}} end
+    assert wait.(options, row.(7)) == 2
+    # At rest with the middle within the flock's radius it is there.
+    assert wait.([course: [{0, 0}, {1.4, 0}, {12, 0}]], row.(1)) == 3
+    # 0.02 m/s of 0.05.
+    slow = [speed: 0.05, course: [{0, 0}, {1.4, 0}, {12, 0}]]
+    assert wait.(slow, %{mag2: {0.4, 0.04}}) == 2
+  end
+
+  test "rest counts anew on each leg" do
+    options = [course: [{9, 0}, {0.7, 0}, {9, 0}]]
+    {runner, _effects} = tick(flock(options), 0)
+    runner = Enum.reduce(1..40, runner, &elem(tick(&2, 500 * &1), 0))
+    runner = hear(runner, :mag2, letter(options, leg: 2))
+    runner = Enum.reduce(41..48, runner, &elem(tick(&2, 500 * &1), 0))
+    assert {runner.mission.leg, runner.mission.done_ms} == {2, nil}
+  end
+
+  test "of large groups the nearest of each are asked for sight, in whatever order" do
+    own = for n <- 1..9, do: {:"mag#{n}", {-1.0 - 0.2 * n, -1.5}}
+    # The ninth alone sees through the door.
+    own = List.replace_at(own, 8, {:mag9, {-3.9, 1.4}})
+    others = for n <- 1..9, do: {:"min#{n}", {1.0 + 0.2 * n, 1.4}}
+
+    for {own, others} <- [{own, others}, {Enum.reverse(own), Enum.reverse(others)}] do
+      refute Sight.any?(hall(11), own, others)
+      assert Sight.any?(hall(11), tl(Enum.sort(own)), others)
+    end
   end
 
   test "a member that fell silent is waited for no longer" do

@@ -48,7 +48,7 @@ defmodule Missions.Explore.SharedMap do
   @spec good(t()) :: String.t() | nil
   def good(%__MODULE__{survey: survey}) do
     with {sure, walls} when walls > 0 <- Survey.confirmed(survey),
-         do: "; later looks confirmed #{round(100 * sure / walls)} % of the walls that it heard",
+         do: ", walls #{round(100 * sure / walls)} % confirmed",
          else: (_no_wall -> nil)
   end
 

@@ -13,6 +13,8 @@ defmodule Missions.Flock.Sight do
   @beside 0.2
   # A line with less room than this leads through a wall.
   @wall 0.01
+  # Between groups, lines from so many of one to so many of the other are tried.
+  @few 8
 
   @doc "Whether the robot can drive straight from one point to another, by the walls that it knows."
   @spec sees?(Percept.t(), Pose.point(), Pose.point()) :: boolean()
@@ -63,13 +65,21 @@ defmodule Missions.Flock.Sight do
   @spec line?(Grid.t(), Pose.point(), Pose.point()) :: boolean()
   def line?(grid, from, to), do: Grid.free_line?(grid, from, to, @wall)
 
-  @doc "Whether no wall lies between some of these members and some of the others."
-  @spec any?(Grid.t() | nil, [Members.member()], [Members.member()]) :: boolean()
+  @doc "Whether no wall lies between these members and the others: between the 8 of each that are nearest to the middle of the other."
+  @spec any?(Grid.t() | nil, [Members.member(), ...], [Members.member(), ...]) :: boolean()
   def any?(nil, _some, _others), do: true
 
   def any?(grid, some, others) do
-    Enum.any?(some, fn {_id, at} ->
-      Enum.any?(others, fn {_other, to} -> line?(grid, at, to) end)
+    near = nearest(others, Members.middle(some))
+
+    Enum.any?(nearest(some, Members.middle(others)), fn {_id, at} ->
+      Enum.any?(near, fn {_other, to} -> line?(grid, at, to) end)
     end)
   end
+
+  defp nearest(members, point),
+    do:
+      members
+      |> Enum.sort_by(fn {id, at} -> {Pose.distance(at, point), id} end)
+      |> Enum.take(@few)
 end
