@@ -21,6 +21,7 @@ defmodule Robot.Localiser do
     Frame,
     History,
     MonteCarlo,
+    PlanFilter,
     RingCheck,
     Sightings,
     TurnCheck,
@@ -28,7 +29,6 @@ defmodule Robot.Localiser do
   }
 
   alias Robot.Localiser.Belief.Marks
-  alias Nav.Grid
   alias Robot.Percept
 
   # Odometry that begins farther from zero than this (metres, radians) was counting before.
@@ -40,13 +40,6 @@ defmodule Robot.Localiser do
   @nearly 0.12 * 0.12
   # A robot that was started again on its way has found its place when it knows it by this (m).
   @found_radius 1.0
-
-  # A belief that is vaguer than this (metres) tells the filter of the plan nothing. One is set by that filter if it contradicts
-  # it by so many standard deviations, and more than so many metres, or is vaguer by so much.
-  @hint 1.0
-  @contradicts 3.0
-  @apart 0.5
-  @vaguer 2.5
 
   # A robot that is told where it stands believes that if it knows its place less by this factor.
   @less_sure 1.5
@@ -117,13 +110,8 @@ defmodule Robot.Localiser do
   @spec anchors(t(), Anchors.t()) :: t()
   def anchors(%{anchors: %{marks: before}} = localiser, %Anchors{frame: frame} = anchors) do
     localiser = localiser |> join(frame) |> Map.put(:anchors, anchors)
-    if before == [] and anchors.marks != [], do: renumber(localiser), else: localiser
+    if before == [] and anchors.marks != [], do: Frame.renumber(localiser), else: localiser
   end
-
-  # The number begins with the time of the first tick, so that it differs between starts of a
-  # robot.
-  defp renumber(%{frame_no: nil} = localiser), do: localiser
-  defp renumber(%{frame_no: number} = localiser), do: %{localiser | frame_no: number + 1}
 
   # The frame of the last leader remains valid when no robot leads any more.
   defp join(localiser, nil), do: localiser
@@ -161,7 +149,7 @@ defmodule Robot.Localiser do
       |> Frame.joined(frame.at, position, heading)
       |> Frame.led(frame.slip)
 
-    renumber(%{localiser | frame: frame, belief: belief, walls: %Walls{}})
+    Frame.renumber(%{localiser | frame: frame, belief: belief, walls: %Walls{}})
   end
 
   # The uncertainty between two frames: one may be the base of the other, or both derive from the
@@ -192,79 +180,12 @@ defmodule Robot.Localiser do
       |> see(percept)
       |> turn(percept)
       |> hear(percept)
-      |> judged(percept)
+      |> PlanFilter.judged(percept)
       |> told()
       |> found()
 
     percept = exposed(percept, localiser)
     {%{percept | pose: localiser.belief.pose, uncertainty: uncertainty(localiser)}, localiser}
-  end
-
-  # The filter of the plan goes its own way, whose frame the robot is in, and corrects what it contradicts.
-  defp judged(%{monte_carlo: nil} = localiser, %{grid: %Grid{closed?: true}} = percept) do
-    filter = MonteCarlo.new(percept, start(localiser), localiser.seed, localiser.lost?)
-    %{localiser | monte_carlo: filter}
-  end
-
-  defp judged(%{monte_carlo: %MonteCarlo{} = before, belief: belief} = localiser, percept) do
-    filter = MonteCarlo.update(before, percept, hint(localiser), belief.pose)
-    localiser = %{localiser | monte_carlo: filter}
-
-    cond do
-      filter.at_ms == before.at_ms -> localiser
-      filter.search != nil -> astray(localiser, before, percept)
-      true -> agree(localiser, MonteCarlo.estimate(filter, localiser.walls.trust.trusted?))
-    end
-  end
-
-  defp judged(localiser, _percept), do: localiser
-
-  # By marks or by other robots it may find its place again, too.
-  defp astray(%{lost?: false} = localiser, %{search: %{}}, percept),
-    do: judged(%{localiser | monte_carlo: nil}, percept)
-
-  defp astray(localiser, %{search: %{}}, _percept), do: localiser
-
-  defp astray(localiser, _knew, _percept) do
-    belief = Frame.lost(localiser.belief)
-    %{localiser | belief: belief, lost?: true, plan?: false, walls: %Walls{}}
-  end
-
-  defp agree(localiser, nil), do: localiser
-
-  defp agree(localiser, {pose, variance}) do
-    placed = placed(localiser, pose, variance)
-    {worst, _least, _heading} = Belief.sd(localiser.belief)
-    {now, _least, _heading} = Belief.sd(placed)
-    off = Pose.distance(placed.pose, localiser.belief.pose)
-    # A vague leader goes on as it does: all that follow it would have to turn with it.
-    vague? = worst > @vaguer * now and (localiser.anchors.walls? or localiser.lost?)
-
-    if vague? or
-         (off > @apart and off > @contradicts * :math.sqrt(worst * worst + now * now)),
-       do: renumber(%{localiser | belief: placed, lost?: false, walls: %Walls{}}),
-       else: localiser
-  end
-
-  # A belief on the plan, in the present frame.
-  defp placed(%{belief: belief, frame: frame}, pose, variance) do
-    belief = belief |> Marks.forget() |> Belief.set(pose, variance)
-
-    if frame,
-      do: Frame.joined(belief, frame.at, elem(frame.start, 0), elem(frame.start, 1)),
-      else: belief
-  end
-
-  # Where it believes to be on the plan.
-  defp start(%{belief: belief} = localiser) do
-    {worst, _least, heading} = Belief.sd(belief)
-    {square, turn} = if localiser.frame, do: localiser.frame.start, else: {0.0, 0.0}
-    {belief.pose, {:math.sqrt(worst * worst + square), :math.sqrt(heading * heading + turn)}}
-  end
-
-  defp hint(localiser) do
-    {_pose, {place_sd, _heading_sd}} = hint = start(localiser)
-    if place_sd < @hint, do: hint
   end
 
   # The same error is in all that is told, so it counts only for a robot that knows less.
@@ -281,11 +202,11 @@ defmodule Robot.Localiser do
   defp found(%{lost?: false} = localiser), do: localiser
 
   defp found(localiser),
-    do: %{localiser | lost?: Anchors.radius(spread(localiser)) > @found_radius}
+    do: %{localiser | lost?: Anchors.radius(PlanFilter.spread(localiser)) > @found_radius}
 
   defp uncertainty(%{belief: belief, frame: frame, frame_no: number} = localiser) do
     {_worst, _least, heading} = Belief.sd(belief)
-    spread = spread(localiser)
+    spread = PlanFilter.spread(localiser)
     position = elem(spread, 0)
     {square, turn} = if frame, do: frame.start, else: {0.0, 0.0}
 
@@ -304,16 +225,7 @@ defmodule Robot.Localiser do
     }
   end
 
-  # The filter takes the errors of the robots ahead for less common than they are: at the end of a
-  # long column it would be surer of the direction of the column than those at its beginning.
-  defp spread(%{belief: belief, anchors: %{frame: frame} = anchors}) do
-    spread = Belief.spread(belief)
-
-    if frame,
-      do: Anchors.swung(spread, Pose.point(belief.pose), frame.at, Anchors.direction_sd(anchors)),
-      else: spread
-  end
-
+  # The number begins with the time of the first tick, so that it differs between starts of a robot.
   defp numbered(%{frame_no: nil} = localiser, at_ms),
     do: %{localiser | frame_no: Integer.mod(at_ms, @numbers)}
 

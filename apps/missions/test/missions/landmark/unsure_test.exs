@@ -87,9 +87,17 @@ defmodule Missions.Landmark.UnsureTest do
     assert {_slot, heading} = stand(0.1, 0.62, 5, room(nil)).facing.toward
     assert_in_delta heading, 0.0, 1.0e-6
     assert stand(0.1, 0.3, 5, room(nil)).facing.toward == nil
-    assert stand(0.1, 0.62, 5, room(25)).facing.toward == nil
+    # By walls that are not all there are it does not turn round.
+    assert stand(0.1, 0.62, 5, %{room(25) | closed?: false}).facing.toward == nil
     # Without walls it would not know whom they hide.
     assert stand(0.1, 0.62, 5).facing.toward == nil
+  end
+
+  test "by a floor plan it turns all round, one turn after the other, when there is nothing to look at" do
+    toward = fn seconds -> stand(0.1, 0.62, seconds, room(25)).facing.toward end
+    assert toward.(3) == nil
+    headings = for seconds <- [5, 9, 13, 17], do: elem(toward.(seconds), 1)
+    assert headings == [2.1, -2.1, 0.0, 2.1]
   end
 
   test "it reports unsure, and neither in place nor blocked" do

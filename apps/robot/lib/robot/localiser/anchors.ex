@@ -195,6 +195,8 @@ defmodule Robot.Localiser.Anchors do
   # of its own small errors.
   @direction_share 0.5
   @near 1.5
+  # A robot that is vaguer than this (metres) shows no direction.
+  @lost 2.0
 
   @doc """
   The standard deviation (radians) that the direction from the leader has at least for a robot that
@@ -206,13 +208,18 @@ defmodule Robot.Localiser.Anchors do
       iex> anchors = %Robot.Localiser.Anchors{frame: %{at: {0.0, 0.0}}, marks: marks}
       iex> Float.round(Robot.Localiser.Anchors.direction_sd(anchors), 3)
       0.015
+      iex> lost = %{anchors | marks: [mark.(-4.0, 5.0) | marks]}
+      iex> Float.round(Robot.Localiser.Anchors.direction_sd(lost), 3)
+      0.015
   """
   @spec direction_sd(t()) :: float()
   def direction_sd(%__MODULE__{frame: nil}), do: 0.0
 
   def direction_sd(%__MODULE__{frame: %{at: {x, y} = leader}, marks: marks}) do
     sds =
-      for %{kind: :robot, reference?: true, at: {mx, my} = at, sd: spread} <- marks,
+      for %{kind: :robot, reference?: true, at: {mx, my} = at, sd: {worst, _, _} = spread} <-
+            marks,
+          worst < @lost,
           distance = Pose.distance(at, leader),
           distance > @near do
         root(variance(spread, {(y - my) / distance, (mx - x) / distance})) / distance

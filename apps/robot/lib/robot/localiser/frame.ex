@@ -26,6 +26,11 @@ defmodule Robot.Localiser.Frame do
   # The index of the error that the places of all robots share.
   @common 7
 
+  @doc "A localiser whose estimate has jumped: its frame is another one from now on, for all that stand by it."
+  @spec renumber(localiser) :: localiser when localiser: map()
+  def renumber(%{frame_no: nil} = localiser), do: localiser
+  def renumber(%{frame_no: number} = localiser), do: %{localiser | frame_no: number + 1}
+
   @doc """
   The pose of a robot that comes into the frame of a leader at `at` whose own pose has these
   variances (m2, rad2). The frame is turned about the leader by the same unknown angle for all

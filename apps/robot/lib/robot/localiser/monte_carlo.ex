@@ -81,6 +81,7 @@ defmodule Robot.Localiser.MonteCarlo do
                 number: 1,
                 turned: 0.0,
                 way: 0.0,
+                fitted: 0.0,
                 slow: nil,
                 fast: nil,
                 worse: 0,
@@ -92,7 +93,7 @@ defmodule Robot.Localiser.MonteCarlo do
   `held` are the particles of the place where the robot is, as far as it knows, `nil` for none; `search` those of a lost robot
   everywhere else; `rivals` are the other places that fit. `at` is the odometry at the last look, whose `number` it is; `last` is
   the odometry since, `turned` the sum of all angles since (radians), `way` the way since the place is held, or since it did not
-  fit (metres). `shown` counts good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
+  fit (metres), and `fitted` the longest. `shown` counts good looks, `worse` those in a row at which another place fitted better, `calm` those of a lost robot without a
   rival, and those of another one with rivals.
   """
   @type t :: %__MODULE__{
@@ -107,6 +108,7 @@ defmodule Robot.Localiser.MonteCarlo do
           number: pos_integer(),
           turned: float(),
           way: float(),
+          fitted: float(),
           slow: float() | nil,
           fast: float() | nil,
           worse: non_neg_integer(),
@@ -182,14 +184,14 @@ defmodule Robot.Localiser.MonteCarlo do
 
   @doc """
   Where the robot surely is by the plan, and the variance of that; `nil` if it does not surely know. A plan that was not
-  `trusted?` must fit over a longer way: two walls of another building may fit for a metre.
+  `trusted?` must have fitted over a longer way once: two walls of another building may fit for a metre.
   """
   @spec estimate(t(), trusted? :: boolean()) :: {Pose.t(), Modes.variance()} | nil
   def estimate(
         %__MODULE__{state: :tracking, shown: shown, held: %{good: good} = held} = filter,
         trusted?
       )
-      when shown >= @shown and good >= @shown and (trusted? or filter.way >= @found_way),
+      when shown >= @shown and good >= @shown and (trusted? or filter.fitted >= @found_way),
       do: {Pose.compose(held.pose, Pose.relative(filter.at, filter.last)), held.variance}
 
   def estimate(%__MODULE__{}, _trusted?), do: nil
@@ -276,6 +278,7 @@ defmodule Robot.Localiser.MonteCarlo do
       filter
       | held: held,
         way: if(good?, do: filter.way, else: 0.0),
+        fitted: if(good?, do: max(filter.fitted, filter.way), else: filter.fitted),
         slow: mean(filter.slow, share, @slow),
         fast: mean(filter.fast, share, @fast),
         shown: shown(filter.shown, good?),

@@ -93,7 +93,8 @@ defmodule Robot.Localiser.Silhouettes do
       belief
     else
       pose = moved(belief.pose, axis, turn, at)
-      {sd, common} = found(robots, pose, axis)
+      near = for {cost, way, _, _} <- tried, cost < least + 1.0, do: abs(way - at)
+      {sd, common} = found(robots, pose, axis, max(@found_sd, Enum.max(near)))
       Belief.shifted(belief, axis, at, sd, common)
     end
   end
@@ -131,12 +132,12 @@ defmodule Robot.Localiser.Silhouettes do
 
   # The place found is as wrong as that of the nearest robot. The part of that error which all
   # robots share does not become less by another picture.
-  defp found(robots, pose, {x, y}) do
+  defp found(robots, pose, {x, y}, found_sd) do
     %{sd: {sd, _least, _direction}, common: {cx, cy}} =
       Enum.min_by(robots, &Pose.distance(pose, &1.at))
 
     common = x * cx + y * cy
-    {:math.sqrt(@found_sd * @found_sd + max(sd * sd - common * common, 0.0)), common}
+    {:math.sqrt(found_sd * found_sd + max(sd * sd - common * common, 0.0)), common}
   end
 
   defp search(pose, back, {x, y}, turn, {pan, focal}),

@@ -131,6 +131,24 @@ defmodule Robot.Localiser.MonteCarloTest do
              []
   end
 
+  test "a plan that once fitted for 3 m need not do so again when the corrections by walls have found it wrong" do
+    plan = plan()
+    step = Pose.new(0.05, 0.0, 0.07)
+
+    {_truth, _odometry, %{monte_carlo: filter}} =
+      Enum.reduce(1..90, {@start, @here, Localiser.new(@start)}, fn k,
+                                                                    {truth, odometry, before} ->
+        {truth, odometry} = {Pose.compose(truth, step), Pose.compose(odometry, step)}
+        {_percept, now} = Localiser.update(before, percept(plan, truth, odometry, 100 * k))
+        {truth, odometry, now}
+      end)
+
+    assert filter.fitted > 3.0
+    assert {_pose, _variance} = MonteCarlo.estimate(%{filter | way: 0.0}, false)
+    assert MonteCarlo.estimate(%{filter | way: 0.0, fitted: 0.0}, false) == nil
+    assert {_pose, _variance} = MonteCarlo.estimate(%{filter | way: 0.0, fitted: 0.0}, true)
+  end
+
   test "on a plan of another building it says nothing of itself" do
     seen = drive(Room.plan({12.0, 9.0}), Localiser.new(@start), @start, 200)
     assert Enum.uniq(for {_k, _truth, percept} <- seen, do: percept.uncertainty.place) == [nil]

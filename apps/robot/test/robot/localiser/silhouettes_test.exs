@@ -168,6 +168,16 @@ defmodule Robot.Localiser.SilhouettesTest do
     assert Silhouettes.align(unsure, [], picture, @here) == unsure
   end
 
+  test "one that fits over a range of places is no surer than that range" do
+    # Robots abreast, without a gap, that fill the picture from wherever the robot may be.
+    near = for n <- -4..4, do: %{hd(@column) | key: n, at: {0.5, 0.3 * n}}
+    unsure = unsure(0.1)
+    found = Silhouettes.align(unsure, near, picture(near, @here), @here)
+    assert found.pose == @here
+    {sd, _, _} = Belief.sd(found)
+    assert sd > 0.2
+  end
+
   test "one that is unsure of its heading by half a radian stays where it is: any blob fits somewhere" do
     one = Enum.take(@column, 1)
     picture = picture(one, turned(-0.1))

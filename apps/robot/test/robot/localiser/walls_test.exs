@@ -2,7 +2,7 @@ defmodule Robot.Localiser.WallsTest do
   use ExUnit.Case, async: true
   alias Hal.Pose
   alias Robot.{Localiser, Room}
-  alias Robot.Localiser.{Anchors, Covariance}
+  alias Robot.Localiser.{Anchors, Covariance, PlanFilter}
 
   setup do
     :rand.seed(:exsss, 1)
@@ -150,10 +150,29 @@ defmodule Robot.Localiser.WallsTest do
     assert radius > 0.8
   end
 
-  test "corrects nothing where robots take their places from each other" do
+  test "one that knows its place by the plan is as sure of it among robots that know theirs less" do
+    {_off, radius, localiser} = follow(drive(1), Room.plan(@size))
+    at = {localiser.belief.pose.x - 4.0, localiser.belief.pose.y}
+    sure = %{position: 1.0e-4, heading: 1.0e-4, start: {1.0e-4, 1.0e-4}}
+    zeros = %{base: nil, at: at, drift: {0.0, 0.0, 0.0}, slip: 0.0, key: {:mag1, 1, 1}}
+    {x, y} = at
+    ahead = %{kind: :robot, reference?: true, at: {x + 2.0, y}, sd: {1.5, 1.5, 0.0}}
+    anchors = %Anchors{frame: Map.merge(zeros, sure), marks: [ahead]}
+    {by_plan, _, _} = PlanFilter.spread(%{localiser | anchors: anchors})
+    {swung, _, _} = PlanFilter.spread(%{localiser | anchors: anchors, monte_carlo: nil})
+    assert radius < 0.3 and by_plan < 0.2
+    assert swung > 1.0
+  end
+
+  test "one that leads is set right by the filter of the plan, seldom and at once, not by each wall" do
     track = drive(1)
-    localiser = Localiser.anchors(Localiser.new(@start), %Anchors{walls?: false})
-    {off, radius, _localiser} = follow(track, Room.plan(@size), localiser)
-    assert {^off, ^radius, _localiser} = follow(track, nil)
+    leads = Localiser.anchors(Localiser.new(@start), %Anchors{walls?: false})
+    {off, radius, localiser} = follow(track, Room.plan(@size), leads)
+    {dead, vague, _localiser} = follow(track, nil)
+    assert dead > 0.5 and vague > 1.0
+    assert off < 0.1 and radius < 0.3
+    assert localiser.walls.at == nil
+    # Those that follow turn with it each time.
+    assert localiser.frame_no in 1..5
   end
 end

@@ -1,8 +1,8 @@
 defmodule Missions.Landmark.Follower.Facing do
   @moduledoc false
   # Turns a follower that has been unsure of its place in its slot for 4 s to what it can make sure by: the leader, the landmark
-  # and the robots ahead, one after the other, as far as no wall hides them. It stays turned, because it would not be in place
-  # while it turned back. Pure.
+  # and the robots ahead, one after the other, as far as no wall hides them; then, by a floor plan, all round, because its sonars
+  # hear the walls anew at each angle. It stays turned, because it would not be in place while it turned back. Pure.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.SlotPoses
@@ -11,6 +11,8 @@ defmodule Missions.Landmark.Follower.Facing do
   @unsure_ms 4_000
   # A line of sight is a disc of this radius (metres), less than the clearance of any free cell.
   @ray 0.01
+  # All round in three turns, each of which is over by then (radians from the slot's heading).
+  @round [2.1, -2.1, 0.0]
   # A slot that moved by less (metres) is the same one.
   @same 0.2
 
@@ -34,9 +36,9 @@ defmodule Missions.Landmark.Follower.Facing do
     facing = %{facing | unsure_ms: since_ms, toward: toward}
 
     with true <- where == :unsure and now - since_ms >= @unsure_ms,
-         [_ | _] = marks <- visible(mission, leader) do
-      mark = Enum.at(marks, rem(div(now - since_ms, @unsure_ms) - 1, length(marks)))
-      %{facing | toward: {slot, heading(mission.percept.pose, mark)}}
+         [_ | _] = headings <- headings(mission, slot, leader) do
+      heading = Enum.at(headings, rem(div(now - since_ms, @unsure_ms) - 1, length(headings)))
+      %{facing | toward: {slot, heading}}
     else
       _sure -> facing
     end
@@ -50,6 +52,17 @@ defmodule Missions.Landmark.Follower.Facing do
   defp since(%{unsure_ms: since_ms}, :unsure, now), do: since_ms || now
   defp since(%{unsure_ms: since_ms}, :turning, _now), do: since_ms
   defp since(_facing, _sure_or_away, _now), do: nil
+
+  defp headings(%{percept: percept} = mission, slot, leader) do
+    seen = for mark <- visible(mission, leader), do: heading(percept.pose, mark)
+
+    round =
+      for turn <- @round,
+          match?(%Grid{closed?: true}, percept.grid),
+          do: Pose.wrap(slot.heading + turn)
+
+    seen ++ round
+  end
 
   defp heading(pose, {x, y}), do: :math.atan2(y - pose.y, x - pose.x)
 

@@ -176,16 +176,20 @@ defmodule Robot.Localiser.MonteCarlo.Population do
       abs(Pose.wrap(a.heading - b.heading)) <= @turned
   end
 
-  @doc "Notes how well the readings fit the place of the particles; a look is good from this share on."
+  @doc """
+  Notes how well the readings fit the place of the particles; a look is good from this share on, of its own readings or of those of
+  the last looks.
+  """
   @spec judged(t(), look(), good :: float()) :: t()
   def judged(%{pose: pose} = population, look, good) do
     [{sum, fits}] = weigh(Reference.pack({pose.x, pose.y, pose.heading, 0.0}), look)
-    good? = fits >= good * look.counting
+    looks = Enum.take([{fits, look.counting} | population.looks], @looks)
+    good? = fits >= good * look.counting or (share(%{looks: looks}) || 0.0) >= good
     mean = max(@mean, 1 / (population.count + 1))
 
     %{
       population
-      | looks: Enum.take([{fits, look.counting} | population.looks], @looks),
+      | looks: looks,
         good: if(good?, do: population.good + 1, else: 0),
         count: population.count + 1,
         score: population.score + mean * (sum - population.score),
