@@ -101,6 +101,10 @@
   # code that its release does not have (docs/missions.md). A restart returns to the release.
   # replace: false,
 
+  # It moves only while a person's page, gamepad or bin/presence is heard, and so many seconds after the last word it stops and
+  # is held, as by an emergency stop. 0.5 to 60; nil for never.
+  # presence: 1.0,
+
   # Here an e-stop outlives a restart of the machine; the folder must be there.
   # estop_file: "/var/lib/convoy/estop",
 

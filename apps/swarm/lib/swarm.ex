@@ -28,7 +28,7 @@ defmodule Swarm do
   is sent somewhere leaves the group's mission, which goes on without it until the next start.
   """
   alias Robot.Command
-  alias Swarm.{BehaviourRegistry, Commands, Formation, Replacement, Status}
+  alias Swarm.{BehaviourRegistry, Commands, Directory, Formation, Replacement, Status}
   alias Swarm.Transport
   alias Swarm.EStop.Broadcaster
   alias Swarm.Status.Matrix
@@ -302,6 +302,21 @@ defmodule Swarm do
     with :ok <- Commands.Client.timely() do
       Broadcaster.quiet(:all)
       command(:all, :reset)
+    end
+  end
+
+  @doc """
+  Tells all robots that move only in the presence of a person (`presence:` of their files) that one looks after them now. Pages, pads
+  and `bin/presence` say so several times a second; a program that says so without a person takes the rule away. As an
+  order, it counts from when it was given.
+
+      Swarm.present()
+  """
+  @spec present() :: answer()
+  def present do
+    case Directory.attended() do
+      [] -> :ok
+      robots -> Commands.tell(robots, :present)
     end
   end
 

@@ -87,6 +87,7 @@ defmodule Console.Gamepad do
     if stick, do: Process.send_after(self(), :word, @word_ms)
     source = {s.module, s.live}
     now_us = System.monotonic_time(:microsecond)
+    if stick, do: Orders.give(s.orders, Orders.of_presence(now_us))
     Orders.give(s.orders, Orders.of_word(s.robot, stick || {0.0, 0.0}, :gamepad, source, now_us))
     %{s | driving?: stick != nil, refused: if(s.driving?, do: s.refused)}
   end

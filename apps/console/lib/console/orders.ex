@@ -22,11 +22,12 @@ defmodule Console.Orders do
 
   @typedoc """
   What there is to do: `run` gets the age of the order in ms. A `:stop` goes past all others, and one of its `key` is
-  under way at a time. A `{:word, robot, longest_ms}` is dropped in silence when it is older, and answered only if it was
+  under way at a time; so does `:present`, which is dropped while one is under way, and never answered. A `{:word, robot, longest_ms}` is dropped in silence when it is older, and answered only if it was
   refused. A `:question` may have any age.
   """
   @type order :: %{
-          kind: :order | :stop | :question | {:word, atom(), longest_ms :: pos_integer()},
+          kind:
+            :order | :stop | :present | :question | {:word, atom(), longest_ms :: pos_integer()},
           key: term(),
           line: String.t(),
           given_us: integer(),
@@ -73,6 +74,13 @@ defmodule Console.Orders do
     }
   end
 
+  @doc "That a person was heard then, for robots that move only in the presence of one."
+  @spec of_presence(given_us :: integer()) :: order()
+  def of_presence(given_us) do
+    said = fn _age_ms -> with :ok <- Swarm.present(), do: {:ok, "present"} end
+    %{kind: :present, key: :present, line: "present", given_us: given_us, run: said}
+  end
+
   @doc "Returns when all that was given before has been carried out and answered, or dropped."
   @spec settle(pid()) :: :ok
   def settle(orders), do: GenServer.call(orders, :settle, :infinity)
@@ -98,6 +106,12 @@ defmodule Console.Orders do
       nil -> {:noreply, put_in(s.stops[begin(stop)], {stop, nil})}
       {ref, {under_way, _next}} -> {:noreply, put_in(s.stops[ref], {under_way, stop})}
     end
+  end
+
+  def handle_cast({:give, %{kind: :present} = word}, s) do
+    if Enum.any?(s.stops, &match?({_ref, {%{kind: :present}, _again}}, &1)),
+      do: {:noreply, s},
+      else: {:noreply, put_in(s.stops[begin(word)], {word, nil})}
   end
 
   def handle_cast({:give, order}, s), do: {:noreply, next(%{s | waiting: wait(s, order)})}
@@ -169,6 +183,7 @@ defmodule Console.Orders do
   # Words come ten times a second: only a refusal is told.
   defp told(_s, %{kind: {:word, _robot, _longest_ms}}, answer) when answer == :late, do: :ok
   defp told(_s, %{kind: {:word, _robot, _longest_ms}}, {:ok, _accepted}), do: :ok
+  defp told(_s, %{kind: :present}, _answer), do: :ok
   defp told(s, order, answer), do: s.answer.(order.line, answer)
 
   defp settled(%{running: nil, waiting: [], stops: stops} = s) when stops == %{} do

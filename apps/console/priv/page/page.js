@@ -4,6 +4,7 @@ import { HeldKeys, modified } from "./keys.js";
 
 const by = (id) => document.getElementById(id);
 const DRIVE_MS = 100; // how often the keyboard says a word; the server stops after 300 ms without one
+const PRESENT_MS = 250; // how often a person who sees the page is told of
 const OLD_MS = 2000; // a scene comes ten times a second
 // A stop is sent at any time; all else only while the fleet is heard.
 const STOP = /^\s*(e+[\s-]?stop|stop|halt|emergenc|disarm)/i;
@@ -107,6 +108,12 @@ function answer({ ok, text }) {
 
 // What is shown is old also where the connection stands and nothing comes.
 setInterval(() => silent() && lost(), 500);
+
+// Robots that move only in the presence of a person hear of one while the page is seen.
+setInterval(() => {
+  if (socket?.readyState === WebSocket.OPEN && !silent() && document.visibilityState === "visible")
+    socket.send(`@${Math.round(performance.now() + ahead)} present`);
+}, PRESENT_MS);
 
 function show(next) {
   scene = next;

@@ -40,6 +40,34 @@ defmodule Console.OrdersTest do
 
   defp answer({pid, ref}, answer \\ {:ok, "done"}), do: send(pid, {ref, answer})
 
+  test "the presence of a person is said beside all that waits, one word at a time, and never answered" do
+    orders = orders()
+    line(orders, "goto mag1 1,1")
+    assert_receive {:told, {:tell, [:mag1], {:goto, 1.0, 1.0, nil}}, first}
+    test = self()
+
+    say = fn ->
+      run = fn _age_ms -> Slow.command(test, :present) end
+      Orders.give(orders, %{Orders.of_presence(now_us()) | run: run})
+    end
+
+    say.()
+    assert_receive {:told, :present, word}
+    say.()
+    answer(first)
+    assert_receive {:answer, "goto mag1 1,1", {:ok, "done"}}
+    refute_received {:told, :present, _second}
+    answer(word)
+    Orders.settle(orders)
+    say.()
+    assert_receive {:told, :present, word}
+    answer(word, {:error, "mag1 does not answer"})
+    Orders.settle(orders)
+    refute_received {:answer, "present", _line}
+    assert {:ok, %{kind: :present}} = Line.order("present", now_us(), [:mag1], {Slow, self()})
+    assert {:error, _line} = Line.order("present", nil, [:mag1], {Slow, self()})
+  end
+
   test "orders run one after the other; a stop goes past them, and drops those that wait" do
     orders = orders()
     for text <- ["goto mag1 1,1", "goto mag1 2,2", "start"], do: line(orders, text)

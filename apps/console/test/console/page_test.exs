@@ -241,6 +241,32 @@ defmodule Console.PageTest do
     defp slow(options),
       do: Live.Trial.start_link(Lab.Trial, Options.trial(options), Console.Pace.new(1.0))
 
+    test "while it is seen it says that a person is there" do
+      options = options("--robots 1 --landmark none")
+      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
+      {_page, url} = page(options, Live.Fleet, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
+
+      Browser.run(browser, """
+      const send = WebSocket.prototype.send;
+      window.said = [];
+      WebSocket.prototype.send = function (line) { window.said.push(line); send.call(this, line); };
+      """)
+
+      Browser.await(
+        browser,
+        "return window.said.filter((line) => /^@-?\\d+ present$/.test(line)).length >= 3"
+      )
+
+      refute Browser.run(browser, "return document.getElementById('answer').textContent") =~
+               "present"
+
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+      Live.Fleet.stop(live)
+    end
+
     test "by keyboard alone one comes to everything in order, and can do all of it" do
       options = options("--robots 2 --landmark none")
       {:ok, live} = Live.Fleet.start_link(Options.trial(options))

@@ -20,6 +20,7 @@ defmodule Robot.Board do
   | `:followed` | `:estop` | the last of the `:presses` that it has made a stop of |
   | `:radio` | `:comms` | counts of messages sent, received, and refused as malformed |
   | `:driving` | `:gate` | `%{twist: twist, limits: [atom]}` |
+  | `:present` | `:gate` | when a person was last heard (`Robot.Safety.Gate.heard/1`) |
   | `:presses` | `:gate` | how often it was stopped directly (`Robot.Safety.Gate.presses/1`) |
   | `:frame` | `:gate` | the odometry frame of the fence: `Robot.Safety.Reflex.frame/1` |
   | `:doing` | `:executive` | the chosen wish and the outcome of the goal (3) |
@@ -114,6 +115,7 @@ defmodule Robot.Board do
     detections: :blob_detector,
     driving: :gate,
     frame: :gate,
+    present: :gate,
     presses: :gate,
     doing: :executive,
     goal: :executive,

@@ -30,6 +30,8 @@ defmodule Robot.Config do
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
+    * `:presence` - so many seconds after a person was last heard (`Robot.Safety.Gate.present/2`) the robot stops, and is held as by an
+      emergency stop; `nil` (the default): it needs no person
     * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), default `false`
     * `:estop_file` - a file in which the e-stop latch survives a restart of the machine, or `nil`
     * `:departure_file` - a file that remembers that the robot has left its start pose (`Robot.Departure`), or `nil`
@@ -67,6 +69,7 @@ defmodule Robot.Config do
                 fence: nil,
                 dry_run: false,
                 replace: false,
+                presence: nil,
                 estop_file: nil,
                 departure_file: nil,
                 trace: nil,
@@ -97,6 +100,7 @@ defmodule Robot.Config do
           fence: Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
+          presence: float() | nil,
           estop_file: Path.t() | nil,
           departure_file: Path.t() | nil,
           trace: call() | nil,
@@ -167,11 +171,16 @@ defmodule Robot.Config do
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       replace: {:one_of, [false, true]},
+      presence: [presence(), default: nil],
       estop_file: [{:path, "the path of a file"}, default: nil],
       departure_file: [{:path, "the path of a file"}, default: nil],
       trace: [:mfa, default: nil]
     ]
   end
+
+  @doc "The option type of `presence`."
+  @spec presence() :: Options.Type.t()
+  def presence, do: {:number, 0.5, 60.0, "s"}
 
   defp plan?(%module{}), do: module in [Nav.Grid, Nav.OccupancyGrid]
   defp plan?(plan), do: plan == nil

@@ -35,6 +35,7 @@ defmodule Robot.File do
                 fence: nil,
                 dry_run: false,
                 replace: false,
+                presence: nil,
                 estop_file: nil,
                 console: nil,
                 record: nil,
@@ -57,6 +58,7 @@ defmodule Robot.File do
           fence: Robot.Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
+          presence: float() | nil,
           estop_file: Path.t() | nil,
           console: keyword() | nil,
           record: keyword() | nil,
@@ -78,6 +80,7 @@ defmodule Robot.File do
     :fence,
     :dry_run,
     :replace,
+    :presence,
     :estop_file
   ]
 

@@ -89,11 +89,14 @@ defmodule Swarm.Comms do
           {EStop, []},
           EStop.entry(),
           {__MODULE__, []},
-          {Directory.Entry, role: :comms, as: :robot}
+          {Directory.Entry, role: :comms, as: :robot, all: attended(config)}
         ]
 
     %{config | transport: options[:transport], boot: options[:boot], companions: companions}
   end
+
+  defp attended(%{presence: nil}), do: []
+  defp attended(%{id: id}), do: [{:attended, id}]
 
   @impl Robot.Companion
   def child_spec({config, _options}), do: Host.child_spec({__MODULE__, config})

@@ -9,6 +9,7 @@ defmodule Swarm.Directory do
   | `{:robot, :mag1}` | the comms process of that robot |
   | `{:estop, :mag1}` | its e-stop process |
   | `:estops` | the e-stop processes of all robots |
+  | `{:attended, :mag1}` | the comms process of that robot, if it moves only in the presence of a person |
   | `{:team, :blue}` | the processes that entered it |
   | `{:service, :camera}`, `{:service, :camera, :mag1}` | the processes that offer it (`Agents.Responder`); that of one robot |
   | `{:topic, :poses}` | the subscribers (`Agents.Topic`) |
@@ -20,6 +21,7 @@ defmodule Swarm.Directory do
           :estops
           | {:robot, atom()}
           | {:estop, atom()}
+          | {:attended, atom()}
           | {:team, atom()}
           | {:service, atom()}
           | {:service, atom(), robot :: atom()}
@@ -71,6 +73,14 @@ defmodule Swarm.Directory do
   def robots do
     if running?(),
       do: Enum.sort(for {:robot, robot} <- :pg.which_groups(__MODULE__), do: robot),
+      else: []
+  end
+
+  @doc "The names of the robots that move only in the presence of a person, sorted."
+  @spec attended() :: [atom()]
+  def attended do
+    if running?(),
+      do: Enum.sort(for {:attended, robot} <- :pg.which_groups(__MODULE__), do: robot),
       else: []
   end
 

@@ -39,12 +39,15 @@ defmodule Console.Page.Line do
 
   @doc """
   The order of a text, for `Console.Orders`; `{:look, robot}` for the robot that is looked at (`look mag1`, and `look` for
-  none). The error says in one line what is allowed.
+  none), `present` that a person sees the page. The error says in one line what is allowed.
   """
   @spec order(String.t(), integer() | nil, [atom()], {module(), live :: term()}) ::
           {:ok, Orders.order()} | {:look, atom() | nil} | {:error, String.t()}
   def order("look" <> name, _given_us, robots, _source),
     do: {:look, Enum.find(robots, &(Atom.to_string(&1) == String.trim(name)))}
+
+  def order("present", given_us, _robots, _source) when given_us != nil,
+    do: {:ok, Orders.of_presence(given_us)}
 
   def order(text, given_us, robots, source) do
     case Teleop.word(text, robots) do

@@ -7,7 +7,9 @@ defmodule Mix.Tasks.Console do
   Exit status: 1 if the input was wrong, or there can be no page.
   """
   use Mix.Task
-  alias Console.{Live, Page}
+  alias Console.{Live, Orders, Page}
+  alias Console.Terminal.Tty
+  alias Swarm.Directory
 
   @look_ms 500
 
@@ -28,6 +30,8 @@ defmodule Mix.Tasks.Console do
     [
       {"connect", "NAME@HOST", &connect/1,
        "the node that must be heard, such as mag1@convoy; or its machine,\nwhere multicast is blocked: mag1@10.0.0.7 (all that are heard)"},
+      {"presence", nil, nil,
+       "each key pressed here says that a person looks after the robots\nwhose files ask for that; q ends it (bin/presence)"},
       {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
     ] ++ Console.Options.Page.table(System.get_env("CONVOY_FROM", "."))
   end
@@ -59,7 +63,7 @@ defmodule Mix.Tasks.Console do
          {:ok, live} <- Live.Mesh.start_link(connect: expected(options["connect"])),
          {:ok, _page, url} <- Page.start_link(page(options, live)) do
       IO.puts("Page:  " <> url)
-      watch(live, nil)
+      person(options["presence"], live)
     end
   end
 
@@ -98,6 +102,54 @@ defmodule Mix.Tasks.Console do
     if host =~ ~r/\A\d+\.\d+\.\d+\.\d+(:\d+)?\z/, do: "#{name}@#{fleet}", else: connect
   end
 
+  defp person(nil, live), do: watch(live, nil)
+
+  # The keys are read here, and the notices come beside them.
+  defp person(true, live) do
+    case Tty.open() do
+      {:ok, saved} ->
+        {:ok, orders} = Orders.start_link(fn _line, _answer -> :ok end)
+        _notices = spawn_link(fn -> watch(live, nil) end)
+        heard = spawn_link(fn -> heard(nil) end)
+        IO.puts("Hold any key while you look after the robots; q ends this program.")
+        keys(orders, heard)
+        Tty.close(saved)
+
+      :error ->
+        {:error, "presence is said by the keys of a terminal, and this is none"}
+    end
+  end
+
+  # Ctrl-C and Ctrl-D are keys, too; a terminal that is gone says nothing more.
+  defp keys(orders, heard) do
+    case IO.getn("", 1) do
+      key when key in ["q", <<3>>, <<4>>, :eof] ->
+        :ok
+
+      {:error, _gone} ->
+        :ok
+
+      _key ->
+        said = Orders.of_presence(System.monotonic_time(:microsecond))
+        Orders.give(orders, %{said | run: &send(heard, {:answered, said.run.(&1)})})
+        keys(orders, heard)
+    end
+  end
+
+  # What becomes of the words, whenever that changes.
+  defp heard(told) do
+    receive do
+      {:answered, answer} ->
+        line = line(answer, Directory.attended())
+        if line != told, do: IO.puts(line)
+        heard(line)
+    end
+  end
+
+  defp line(_answer, []), do: "no robot that is heard asks for the presence of a person"
+  defp line({:ok, _said}, robots), do: "heard by #{Enum.join(robots, ", ")}"
+  defp line({:error, line}, _robots), do: line
+
   # The page goes on until a person ends this program.
   defp watch(live, told) do
     notice = Live.Mesh.notice(live)
@@ -111,5 +163,6 @@ defmodule Mix.Tasks.Console do
     end
   end
 
+  defp refused(:ok), do: :ok
   defp refused({:error, lines}), do: Hal.Cli.Command.refuse("console", List.wrap(lines))
 end

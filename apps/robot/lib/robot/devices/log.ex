@@ -19,6 +19,7 @@ defmodule Robot.Devices.Log do
     [:robot, :fault],
     [:robot, :stage],
     [:robot, :role, :dropped],
+    [:robot, :gate, :absent],
     [:robot, :estop_file, :error],
     [:robot, :estop_file, :healed],
     [:robot, :departure_file, :failed],
@@ -74,6 +75,11 @@ defmodule Robot.Devices.Log do
       {:warning, "mag1 gives up its way to 2.0,1.0: blocked by mag2"}
   """
   @spec line(atom(), map()) :: {Logger.level(), String.t()} | nil
+  def line(:absent, %{robot: robot, seconds: seconds}),
+    do:
+      {:warning,
+       "#{robot}: emergency stop, because no page, pad or bin/presence has been heard for #{seconds} s"}
+
   def line(:offline, %{line: line} = about), do: {:warning, "#{name(about)} offline: #{line}"}
 
   def line(:online, %{again?: true} = about), do: {:info, "#{name(about)} online again"}

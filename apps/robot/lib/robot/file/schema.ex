@@ -46,6 +46,7 @@ defmodule Robot.File.Schema do
      fence: {:or, nil, Fence.type()},
      dry_run: :boolean,
      replace: {:one_of, [false, true]},
+     presence: {:or, nil, Robot.Config.presence()},
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
      record: {:or, nil, {:keys, RecordOptions.table()}},

@@ -93,6 +93,7 @@ defmodule Robot.File.Summary do
         arms: arms(robot),
         stays: fence(robot.fence),
         "e-stop": estop(robot.estop_file),
+        presence: presence(robot.presence),
         power: power(robot.console),
         network: network(robot.network),
         mission: mission(robot.policies),
@@ -245,6 +246,12 @@ defmodule Robot.File.Summary do
     [low, high] = for y <- [Enum.min(ys), Enum.max(ys)], do: metres(y)
     "within #{length(corners)} corners, x from #{left} to #{right}, y from #{low} to #{high}"
   end
+
+  defp presence(nil), do: nil
+
+  defp presence(seconds),
+    do:
+      "moves only while a page, a pad or bin/presence is heard; stops, and is held, #{seconds} s after the last word"
 
   defp estop(nil), do: "forgotten when the machine restarts (no estop_file)"
   defp estop(file), do: "kept in #{file}"

@@ -9,6 +9,9 @@ defmodule Robot.Safety.Gate do
   The gate reads the e-stop latch at its start, so that a restart does not release it. Only
   `reset/1` clears it. When the latch is set or cleared directly, the gate tells the role `:estop`, which spreads the stop.
 
+  Where the robot's file has a `presence:`, a wish to move while no person has been heard for so long latches the gate as a
+  direct stop does (`present/2`).
+
   While the drive is not armed (`Hal.Device.Arming`), the gate commands it only to stand, so that
   a robot starts from standing when a person arms it, and reports why it stands. In a dry run
   (`Robot.Safety.DryRun`) it also commands it only to stand, and reports what it would have
@@ -53,6 +56,18 @@ defmodule Robot.Safety.Gate do
     do: GenServer.cast(Names.via(robot, :gate), {:sense, reading})
 
   def sense(_robot, _reading), do: :ok
+
+  @doc "A person who looks after the robot was heard so long ago (ms)."
+  @spec present(robot :: atom(), age_ms :: non_neg_integer()) :: :ok
+  def present(robot, age_ms), do: GenServer.cast(Names.via(robot, :gate), {:present, age_ms})
+
+  @doc "When a person was last heard, by the robot's clock (ms); `nil` if never."
+  @spec heard(Board.t() | Board.entries()) :: integer() | nil
+  def heard(board) do
+    with {:ok, heard_ms, _at_ms} <- Board.fetch(board, :present, :infinity, 0),
+         do: heard_ms,
+         else: (:error -> nil)
+  end
 
   @doc """
   Stops the robot until `reset/1`. When this returns, the latch is set, the stop has been sent to
@@ -109,7 +124,9 @@ defmodule Robot.Safety.Gate do
         armed?: armed?(board, config),
         fence: config.fence,
         start: config.start,
-        frame: frame(board)
+        frame: frame(board),
+        presence: config.presence,
+        present_ms: heard(board)
       )
 
     state = %__MODULE__{
@@ -143,6 +160,11 @@ defmodule Robot.Safety.Gate do
     noted = framed(Reflex.frame(s.reflex), Reflex.frame(reflex))
     {s, effects} = react(%{s | reflex: reflex}, urgency, at_ms)
     {s, noted ++ effects}
+  end
+
+  def handle({:cast, {:present, age_ms}}, at_ms, s, _board) when is_integer(age_ms) do
+    reflex = Reflex.present(s.reflex, at_ms - max(age_ms, 0))
+    {%{s | reflex: reflex}, [{:put, :present, reflex.present_ms}]}
   end
 
   def handle({:cast, {:latch, then}}, at_ms, s, _board) do
@@ -214,7 +236,21 @@ defmodule Robot.Safety.Gate do
   defp react(s, :later, _at_ms), do: {s, []}
 
   defp step(s, at_ms) do
-    {wanted, limits, reflex} = Reflex.step(s.reflex, at_ms)
+    case Reflex.step(s.reflex, at_ms) do
+      {_stands, [:absent], _reflex} -> absent(s, at_ms)
+      step -> driven(s, step)
+    end
+  end
+
+  # As `estop/1`, but nothing waits.
+  defp absent(%{presses: presses} = s, at_ms) do
+    {s, effects} = latched(%{s | presses: presses + 1}, at_ms)
+    seconds = s.reflex.presence_ms / 1_000
+    told = [{:cast, :estop, :latch}, {:event, [:robot, :gate, :absent], %{seconds: seconds}}]
+    {s, [{:put, :presses, s.presses} | effects] ++ told}
+  end
+
+  defp driven(s, {wanted, limits, reflex}) do
     {twist, limits, rehearsed, told} = rehearse(s, wanted, limits)
     drive = [{:drive, twist, limits} | rehearsed]
 

@@ -6,7 +6,7 @@ defmodule Robot.Safety.Reflex do
   why it is less than wished. For a reading that must not wait for the next step `sense/3` returns `:now`; so does
   `forget/1` while the robot moves.
 
-  The limits, each by its name in `limits`, in the order in which they are applied; each of the first four excludes all
+  The limits, each by its name in `limits`, in the order in which they are applied; each of the first five excludes all
   others, and `:blind` is in the place of `:near` and `:beside`:
 
   | limit | what it does |
@@ -15,6 +15,7 @@ defmodule Robot.Safety.Reflex do
   | `:disarmed` | the drive is not armed: stands (`Hal.Device.Arming`) |
   | `:dead_man` | no wish for 200 ms: stands |
   | `:refused` | the wish was not a pair of numbers, or was absurdly large: stands |
+  | `:absent` | no person has been heard for as long as the robot's file allows (`presence:`), and the wish is not to stand: stands |
   | `:speed` | the profile's greatest speeds |
   | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
   | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
@@ -24,7 +25,7 @@ defmodule Robot.Safety.Reflex do
   | `:acceleration` | the profile's accelerations; braking may be twice as hard |
   | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
 
-  `:estop`, `:disarmed`, `:dead_man`, `:refused` and `:bumper` set the speed to zero immediately:
+  `:estop`, `:disarmed`, `:dead_man`, `:refused`, `:absent` and `:bumper` set the speed to zero immediately:
   how hard the wheels then brake depends on the base. All other limits pass through the ramp of
   `:acceleration`.
 
@@ -42,7 +43,7 @@ defmodule Robot.Safety.Reflex do
   # No sonar and no pose reaches so far (m).
   @far 1.0e9
   # These set a speed to zero without a ramp.
-  @stops [:estop, :disarmed, :dead_man, :refused, :bumper]
+  @stops [:estop, :disarmed, :dead_man, :refused, :absent, :bumper]
 
   @enforce_keys [:profile]
   defstruct @enforce_keys ++
@@ -58,6 +59,8 @@ defmodule Robot.Safety.Reflex do
                 start: nil,
                 frame: nil,
                 place: nil,
+                presence_ms: nil,
+                present_ms: nil,
                 twist: %Twist{linear: 0.0, turn: 0.0},
                 at_ms: nil,
                 before: {%Twist{linear: 0.0, turn: 0.0}, nil}
@@ -76,6 +79,8 @@ defmodule Robot.Safety.Reflex do
           start: Pose.t() | nil,
           frame: fence_frame(),
           place: {Pose.t(), integer()} | nil,
+          presence_ms: pos_integer() | nil,
+          present_ms: integer() | nil,
           twist: Twist.t(),
           at_ms: integer() | nil,
           before: {Twist.t(), integer() | nil}
@@ -92,6 +97,7 @@ defmodule Robot.Safety.Reflex do
           | :disarmed
           | :dead_man
           | :refused
+          | :absent
           | :speed
           | :bumper
           | :near
@@ -105,7 +111,8 @@ defmodule Robot.Safety.Reflex do
   The state of a robot that stands. Options: `latched?` (default false), for a latch that survived
   a restart; `armed?` (default true), until a reading `{:arming, …}` says otherwise; `fence`
   (`Robot.Fence`, default none), with `start`, the pose at which the odometry reads
-  zero (default the origin), and `frame`, the result of `frame/1` before a restart.
+  zero (default the origin), and `frame`, the result of `frame/1` before a restart; `presence`, for how many seconds after a
+  person was heard (`present/2`) the robot may move (default `nil`: always), and `present_ms`, when one was heard last.
 
   A fence uses odometry of one frame only, the first (`Hal.Odometry`). In another frame, zero is
   no longer the start but wherever the robot was when that frame began: its place is unknown, and
@@ -119,7 +126,9 @@ defmodule Robot.Safety.Reflex do
         armed?: true,
         fence: nil,
         start: Pose.new(0, 0),
-        frame: nil
+        frame: nil,
+        presence: nil,
+        present_ms: nil
       )
 
     %__MODULE__{
@@ -128,7 +137,9 @@ defmodule Robot.Safety.Reflex do
       armed?: options[:armed?] == true,
       fence: options[:fence],
       start: options[:start],
-      frame: options[:frame]
+      frame: options[:frame],
+      presence_ms: options[:presence] && round(options[:presence] * 1_000),
+      present_ms: options[:present_ms]
     }
   end
 
@@ -153,6 +164,11 @@ defmodule Robot.Safety.Reflex do
     do: %{reflex | wish: :refused, wish_at_ms: at_ms}
 
   defp sane?(number), do: is_number(number) and number > -@absurd and number < @absurd
+
+  @doc "A person was heard then, who looks after the robot."
+  @spec present(t(), integer()) :: t()
+  def present(%__MODULE__{present_ms: before} = reflex, at_ms),
+    do: %{reflex | present_ms: max(before || at_ms, at_ms)}
 
   @doc """
   Drops the wish, because the process behind it is gone or a stop was ordered. A robot that moves
@@ -270,5 +286,14 @@ defmodule Robot.Safety.Reflex do
     do: {:stop, :dead_man}
 
   defp wanted(%{wish: :refused}, _at_ms), do: {:stop, :refused}
-  defp wanted(%{wish: wish}, _at_ms), do: wish
+
+  defp wanted(%{wish: wish} = reflex, at_ms) do
+    if wish != {0.0, 0.0} and absent?(reflex, at_ms), do: {:stop, :absent}, else: wish
+  end
+
+  defp absent?(%{presence_ms: nil}, _at_ms), do: false
+  defp absent?(%{present_ms: nil}, _at_ms), do: true
+
+  defp absent?(%{presence_ms: most_ms, present_ms: heard_ms}, at_ms),
+    do: at_ms - heard_ms > most_ms
 end

@@ -31,6 +31,22 @@ defmodule Robot.Safety.ReflexTest do
     assert Twist.zero?(twist)
   end
 
+  test "where it moves only in the presence of a person, it does so for as long after the last word" do
+    alone = Reflex.new(Profile.magellan(), presence: 1.0)
+    assert {twist, [:absent], _} = run(alone, Twist.new(0.3, 0), 0, 1)
+    assert Twist.zero?(twist)
+    # To stand is always allowed.
+    assert {_zero, [], _} = run(alone, Twist.zero(), 0, 1)
+
+    {twist, _, reflex} = run(Reflex.present(alone, 0), Twist.new(0.3, 0), 0, 20)
+    assert twist.linear == 0.3
+    # A word that arrives out of turn takes nothing back.
+    reflex = Reflex.present(reflex, -500)
+    assert {%Twist{linear: 0.3}, [], reflex} = run(reflex, Twist.new(0.3, 0), 1_000, 1)
+    assert {twist, [:absent], _} = run(reflex, Twist.new(0.3, 0), 1_001, 1)
+    assert Twist.zero?(twist)
+  end
+
   test "speeds up no faster than the profile allows" do
     {a, limits, reflex} = run(gate(), Twist.new(0.5, 1.0), 0, 1)
     assert a == Twist.new(0.025, 0.05)

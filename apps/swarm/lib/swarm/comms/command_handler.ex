@@ -16,6 +16,7 @@ defmodule Swarm.Comms.CommandHandler do
   | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.MissionRegistry`) |
   | `{:formation, kind, spacing}` | for the running mission |
   | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
+  | `:present` | a person looks after the robot (`Swarm.present/0`) |
   | `:arm`, `:acknowledge` | for the wheels (`Hal.Device`): done, or why not |
 
   While the emergency stop holds a robot, it refuses to be armed and all commands that would move
@@ -26,7 +27,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Hal.{Device, Pose}
   alias Robot.{Board, Names}
   alias Robot.Control.Delivery
-  alias Robot.Safety.{LivenessMonitor, Readiness}
+  alias Robot.Safety.{Gate, LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
   alias Nav.{Grid, Reach}
   alias Mesh.Nonblocking
@@ -59,6 +60,9 @@ defmodule Swarm.Comms.CommandHandler do
     config = Replacement.config(comms.config, board)
 
     case judge(request, config, board, {receiver, at_ms}) do
+      :present ->
+        [{:cast, :gate, {:present, div(now_us - asked_us, 1_000)}}, {:reply, ref, :ok}]
+
       {:drive, order} ->
         drive(order, config.id, ref, {asked_us, now_us})
 
@@ -87,6 +91,7 @@ defmodule Swarm.Comms.CommandHandler do
     end
   end
 
+  defp judge(:present, _config, _board, _heard), do: :present
   defp judge(:acknowledge, _config, _board, _heard), do: {:drive, :acknowledge}
 
   # A command that is accepted while all robots are stopped would begin with the reset.
@@ -100,6 +105,7 @@ defmodule Swarm.Comms.CommandHandler do
     with {:ok, request} <- checked(request, config),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
+         :ok <- attended(config, board, heard),
          :ok <- possible(request, config, board, heard),
          {:ok, ways} <- ways(request, config),
          do: {:mission, ways, command(request)}
@@ -202,6 +208,18 @@ defmodule Swarm.Comms.CommandHandler do
 
   defp ready(_request, config, board) do
     with {:error, line} <- Readiness.of(config, board), do: {:error, "#{config.id}: #{line}"}
+  end
+
+  defp attended(%{presence: nil}, _board, _heard), do: :ok
+
+  defp attended(%{presence: seconds, id: id}, board, {_receiver, at_ms}) do
+    heard_ms = Gate.heard(board)
+
+    if heard_ms != nil and at_ms - heard_ms <= seconds * 1_000,
+      do: :ok,
+      else:
+        {:error,
+         "#{id} moves only while a person's page, pad or bin/presence is heard, and none has been for #{seconds} s"}
   end
 
   defp possible(
