@@ -142,7 +142,9 @@ defmodule Robot.FileTest do
     body: [radius: 90]
     """
 
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, map: nil, tables: []})
+    {:keys, table} =
+      Schema.table(%{bodies: nil, bodiless?: true, colours: nil, map: nil, tables: []})
+
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines(text) == [

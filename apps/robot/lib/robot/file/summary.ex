@@ -7,8 +7,6 @@ defmodule Robot.File.Summary do
 
   alias Robot.File.{Device, RecordOptions, Warnings}
 
-  @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
-  @weights %{magellan: 20, atrv_mini: 40}
   @delay_s 0.3
   @wide 88
 
@@ -74,7 +72,7 @@ defmodule Robot.File.Summary do
     judgement = Device.judge(robot.drive, body)
 
     [
-      "#{robot.id}, #{@kinds[body.name]} of #{@weights[body.name]} kg: #{metres(body.length)} long, " <>
+      "#{robot.id}, #{about(body)}: #{metres(body.length)} long, " <>
         "#{metres(body.width)} wide, #{metres(body.radius)} to its farthest corner"
     ] ++
       rows(
@@ -99,6 +97,12 @@ defmodule Robot.File.Summary do
         replace: replaceable(robot)
       )
   end
+
+  defp about(%Profile{about: about, name: name, mass: mass}),
+    do: (about || "a #{name}") <> if(mass, do: " of #{kilograms(mass)} kg", else: "")
+
+  defp kilograms(mass) when mass >= 10, do: "#{round(mass)}"
+  defp kilograms(mass), do: :erlang.float_to_binary(mass * 1.0, decimals: 1)
 
   defp rows(rows) do
     for {_name, words} = row <- rows, words not in [nil, ""], line <- row(row), do: line
