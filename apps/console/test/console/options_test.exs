@@ -64,7 +64,7 @@ defmodule Console.OptionsTest do
 
     for wrong <- ~w(-1 1.5 dog:1 mag:x 101 nan) do
       assert error("--hardware #{wrong}") ==
-               "--hardware: expected a whole number, or such as mag:1,min:1 (kinds mag and min), got #{inspect(wrong)}"
+               "--hardware: expected a whole number, or such as mag:1,min:1, got #{inspect(wrong)}"
     end
 
     for {line, asked} <- [

@@ -15,6 +15,7 @@ defmodule Hal.Profile do
 
   `bumpers` are so many segments round the body, the first ahead, of which those within `bumper_span` about it exist.
   `camera` is `nil` for a body without one. `about` is what people call it, `mass` is in kg; `nil` if that is not known.
+  `rflex` says whose published wiring and conversions an rFLEX controller in it has, `nil` for none.
   """
   alias Hal.Pose
 
@@ -39,6 +40,7 @@ defmodule Hal.Profile do
                 offset: 0.0,
                 about: nil,
                 mass: nil,
+                rflex: nil,
                 sonar_min: 0.15,
                 sonar_max: 5.1,
                 sonar_cone: :math.pi() / 6,
@@ -59,6 +61,7 @@ defmodule Hal.Profile do
           offset: float(),
           about: String.t() | nil,
           mass: float() | nil,
+          rflex: :magellan | :atrv_mini | nil,
           wheel_base: float(),
           max_linear: float(),
           max_turn: float(),
@@ -90,6 +93,7 @@ defmodule Hal.Profile do
       name: :magellan,
       about: "a Magellan Pro",
       mass: 20.0,
+      rflex: :magellan,
       radius: 0.2,
       length: 0.4,
       width: 0.4,
@@ -125,6 +129,7 @@ defmodule Hal.Profile do
       name: :atrv_mini,
       about: "an ATRV mini",
       mass: 40.0,
+      rflex: :atrv_mini,
       radius: 0.292,
       length: 0.5,
       width: 0.3,

@@ -117,7 +117,7 @@ defmodule Mesh.PureTest do
           {[multicast: nil], ~r/mesh option multicast: expected .*, got nil/},
           {[fleet: []], ~r/mesh option fleet: expected .*, got \[\]/},
           {[fleet: [:"mag1\n"]], "mesh option fleet.1: expected"},
-          {[fleet: ["mag1"]], ~s(mesh option fleet.1: expected a robot's name such as :mag1)},
+          {[fleet: ["Mag1"]], ~s(mesh option fleet.1: expected a robot's name such as "mag1")},
           {[strategies: [String]],
            "mesh option strategies: expected {Module, options}, got String"},
           {[strategies: [{String, 1}]], "strategies names String, which is not a Mesh.Strategy"},

@@ -2,6 +2,8 @@ defmodule Robot.FileTest do
   use ExUnit.Case, async: true
 
   doctest Robot.File
+  doctest Robot.File.Bodies
+  doctest Robot.File.Body
   doctest Robot.File.Reader
   doctest Robot.File.RecordOptions
   doctest Robot.File.Summary

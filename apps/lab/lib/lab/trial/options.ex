@@ -169,10 +169,18 @@ defmodule Lab.Trial.Options do
     end
   end
 
-  defp hardware(%{hardware: ids, robots: robots}) do
-    if ids == Enum.uniq(ids) and ids -- robots == [],
-      do: :ok,
-      else: refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
+  defp hardware(%{hardware: ids, robots: robots, bodies: bodies}) do
+    cond do
+      ids != Enum.uniq(ids) or ids -- robots != [] ->
+        refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
+
+      id = Enum.find(ids, &(bodies[&1].rflex == nil)) ->
+        {:error,
+         "#{id} cannot be hardware: only bodies with an rFLEX controller are emulated on serial lines, mag and min"}
+
+      true ->
+        :ok
+    end
   end
 
   defp refuse(key, value, allowed), do: Options.refuse("trial", [key], value, allowed)

@@ -199,9 +199,19 @@ defmodule Robot.File.Summary do
   end
 
   defp senses(profile, judgement) do
-    "#{length(profile.sonars)} sonars (#{metres(profile.sonar_min)} to #{metres(profile.sonar_max)}), " <>
-      "#{length(profile.irs)} infrareds#{unread(profile, judgement)}, #{profile.bumpers} bumpers#{blind(profile)}"
+    "#{sonars(profile)}, #{length(profile.irs)} infrareds#{unread(profile, judgement)}, " <>
+      "#{bumpers(profile)}#{blind(profile)}"
   end
+
+  defp sonars(%Profile{sonars: []}), do: "no sonars"
+
+  defp sonars(%Profile{sonars: sonars, sonar_min: least, sonar_max: most}),
+    do: "#{length(sonars)} sonars (#{metres(least)} to #{metres(most)})"
+
+  defp bumpers(%Profile{bumpers: count, bumper_span: span}) when count > 0 and span < 6.28,
+    do: "#{count} bumpers round it, those within #{degrees(span)} ahead"
+
+  defp bumpers(%Profile{bumpers: count}), do: "#{count} bumpers"
 
   defp unread(%{irs: [_ | _]}, %{senses: senses}),
     do: if(:infrared in senses, do: "", else: " (not read: no ir_a, no ir_b)")
