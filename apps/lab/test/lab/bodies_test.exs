@@ -117,6 +117,31 @@ defmodule Lab.BodiesTest do
     assert [%{profile: %{name: :kobuki}}] = setup.robots
   end
 
+  test "a scenario names robots of any body, and any robots as text, whose bodies it says" do
+    text = """
+    [
+      robots: ["rex_of_a_scenario", "mag1"],
+      bodies: [rex: "kobuki"],
+      script: [{1, {:kill, :rex_of_a_scenario}}],
+      expect: [{:never, :collision}]
+    ]
+    """
+
+    assert {:ok, scenario} = Lab.Scenario.File.parse(text)
+    assert [rex, :mag1] = scenario.options[:robots]
+    assert Atom.to_string(rex) == "rex_of_a_scenario"
+    assert scenario.options[:bodies] == [rex: "kobuki"]
+    assert Lab.Scenario.File.parse(Lab.Scenario.File.text(scenario)) == {:ok, scenario}
+    assert {:ok, _scenario} = Lab.Scenario.File.parse("[robots: [:burger1, :create2_2]]")
+    assert {:error, [line]} = Lab.Scenario.File.parse("[robots: [\"Rex\"]]")
+
+    assert line =~
+             "scenario:1: robots: expected a number of robots, 1 to 100, or a list of names, "
+
+    assert {:error, [line]} = Lab.Scenario.File.parse("[robots: [:dog_of_a_scenario]]")
+    assert line =~ "got [:dog_of_a_scenario]"
+  end
+
   test "what is wrong with names and bodies is one line" do
     for {options, begins} <- [
           {%{robots: [:rex]}, "the body of robot rex: no body is named rex: there are burger, "},

@@ -133,10 +133,10 @@ defmodule Lab.Trial.Options do
       iex> for {id, body} <- bodies, do: {id, body.name}
       [burger1: :turtlebot3_burger, burger2: :kobuki]
   """
-  @spec bodies([atom()], keyword(atom() | Profile.t()) | %{atom() => Profile.t()}) ::
+  @spec bodies([atom()], [{atom() | String.t(), atom() | String.t() | Profile.t()}] | map()) ::
           {:ok, %{atom() => Profile.t()}} | {:error, line :: String.t()}
   def bodies(robots, given) do
-    given = for {key, body} <- given, do: {Atom.to_string(key), body}
+    given = for {key, body} <- given, do: {to_string(key), body}
     usual = for name <- Bodies.names(), do: {name, name}
 
     Enum.reduce_while(robots, {:ok, %{}}, fn id, {:ok, bodies} ->
@@ -210,7 +210,7 @@ defmodule Lab.Trial.Options do
   defp bodies?(%{} = bodies) when not is_struct(bodies), do: bodies |> Map.to_list() |> bodies?()
 
   defp bodies?(bodies),
-    do: Keyword.keyword?(bodies) and Enum.all?(Keyword.values(bodies), &body?/1)
+    do: Type.keys?(bodies) and Enum.all?(bodies, fn {_key, body} -> body?(body) end)
 
-  defp body?(body), do: (is_atom(body) and RobotName.valid?(body)) or is_struct(body, Profile)
+  defp body?(body), do: RobotName.valid?(body) or is_struct(body, Profile)
 end

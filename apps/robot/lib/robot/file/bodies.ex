@@ -52,6 +52,17 @@ defmodule Robot.File.Bodies do
   end
 
   @doc """
+  The short name of a body, or its own: that which fleets of it have before their numbers.
+
+      iex> Enum.map([:magellan, :create2], &Robot.File.Bodies.short/1)
+      ["mag", "create2"]
+  """
+  @spec short(atom()) :: String.t()
+  def short(name) do
+    Enum.find_value(@short, "#{name}", fn {short, long} -> if long == "#{name}", do: short end)
+  end
+
+  @doc """
   The folders of bodies that belong to a robot's file: `bodies` in its own, and beside that.
 
       iex> Robot.File.Bodies.folders("config/robots/mag1.exs")
