@@ -203,12 +203,11 @@ defmodule Console.Picture.Floor do
     scale = r / robot.radius
     {c, s} = {:math.cos(robot.pose.heading), :math.sin(robot.pose.heading)}
 
-    points =
-      Enum.map_join(corners, " ", fn {ahead, left} ->
-        "#{Float.round(x + scale * (ahead * c - left * s), 2)},#{Float.round(y - scale * (ahead * s + left * c), 2)}"
-      end)
+    places =
+      for {ahead, left} <- corners,
+          do: {x + scale * (ahead * c - left * s), y - scale * (ahead * s + left * c)}
 
-    Svg.element(:polygon, [points: points] ++ look)
+    Svg.element(:polygon, [points: Svg.points(places)] ++ look)
   end
 
   defp slots(ground, scene, colours, at, scale) do
