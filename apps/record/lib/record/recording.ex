@@ -87,7 +87,7 @@ defmodule Record.Recording do
   Makes the names of a recording, which it has as text, known to this program; at most `left` may be new. Returns how many may be
   after that; the error is one line.
 
-      iex> Record.Recording.know(["mag1", "turtlebot3_burger"])
+      iex> Record.Recording.know(["ok", "nil"])
       {:ok, 1_000}
   """
   @spec know(names :: term(), left :: non_neg_integer()) ::
