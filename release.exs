@@ -27,11 +27,12 @@ defmodule Convoy.Release do
     common |> Keyword.merge(own) |> Keyword.update(:applications, @tls, &(&1 ++ @tls))
   end
 
-  # The robot files of the project's folder go along; rel/deploy replaces the robot's own by the newest.
+  # The robot files of the project's folder go along, with its bodies; rel/deploy replaces the robot's own by the newest.
   defp add_robots(release) do
     robots = Path.join(release.path, "robots")
     File.rm_rf!(robots)
     if File.dir?("config/robots"), do: File.cp_r!("config/robots", robots)
+    if File.dir?("config/bodies"), do: File.cp_r!("config/bodies", Path.join(robots, "bodies"))
     release
   end
 

@@ -16,6 +16,9 @@ if name = robot || System.get_env("CONVOY_NODE") do
 
   interface = for text <- words.("CONVOY_INTERFACE"), do: {:interface, text}
 
+  # All names that robots may have: of this machine's own configuration, never from others.
+  fleet = with [_ | _] = names <- words.("CONVOY_FLEET"), do: [fleet: names]
+
   dist_port = number.("CONVOY_DIST_PORT", Mesh.Distribution.Epmd.default_port(name))
 
   # In a release the node is the robot of its file (`Swarm.Host.ReleaseBoot`).
@@ -27,5 +30,5 @@ if name = robot || System.get_env("CONVOY_NODE") do
         dist_port: dist_port,
         port: number.("CONVOY_UDP_PORT", if(robot, do: 4370, else: 0)),
         peers: words.("CONVOY_UDP_PEERS")
-      ] ++ interface
+      ] ++ fleet ++ interface
 end

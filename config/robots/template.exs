@@ -6,27 +6,34 @@
 # is degrees in radians. Metres, radians, seconds; x is forward, y is left, angles grow to the left.
 # What is commented out is the default, or an example where there is none.
 [
-  # Its name in the fleet. mag1 to mag100 and min1 to min100 are known.
+  # Its name: a letter, then letters, digits and _, at most 31, all small. mag1 to mag100 and min1 to min100 are known to all
+  # robots; of others network: has the fleet:.
   id: :mag1,
 
-  # Its kind: :magellan or :atrv_mini. Geometry, sensor poses and limits come with it.
+  # Its body: :magellan, :atrv_mini, :turtlebot3_burger, :turtlebot3_waffle, :create2, :kobuki, :pioneer3, or one of your own,
+  # :rover for config/bodies/rover.exs, which has the keys of body: below. Geometry, sensor poses and limits come with it.
   profile: :magellan,
 
-  # What is different on this one. All lengths in metres.
+  # What is different on this one, or all of a body without a profile:. All lengths in metres.
   body: [
-    # radius: 0.2,                       # of the circle round the whole body
-    # length: 0.4,
+    # about: "a Magellan Pro",           # what people call it
+    # mass: 20,                          # kg
+    # radius: 0.2,                       # of the circle round the whole body, about the middle between the wheels
+    # length: 0.4,                       # a box has these two; a round body has a radius alone
     # width: 0.4,
+    # offset: 0.0,                       # how far the middle of the box is ahead of the wheels
+    # limits: [max_linear: 0.5, max_turn: 1.0], # what such a body can do; limits: below are this robot's
     # height: 0.5,
     # wheel_base: 0.36,                  # between the wheels, left to right
-    # bumpers: 16,                       # 0 for none
+    # bumpers: 16,                       # so many round it, the first ahead; 0 for none
+    # bumper_span: deg(360),             # 180 for a body that has those of its front half only
     # sonars: [{0.2, 0.0, deg(0)}, …],   # {x, y, angle} of each, in the order of the driver's readings
     # sonar_min: 0.15,
     # sonar_max: 5.1,
     # sonar_cone: deg(30),               # full width
     # irs: [{0.2, 0.0, deg(0)}, …],
     # ir_max: 0.8,
-    # camera: [
+    # camera: [                          # nil for none
     #   width: 320, height: 240, field_of_view: deg(60), mount_height: 0.6,
     #   max_pan: deg(100), max_tilt: deg(25), pan_rate: deg(80), tilt_rate: deg(50)
     # ]
@@ -71,7 +78,7 @@
   # [folder: "/var/lib/convoy/pictures", rate: 1.0, files: 1000, megabytes: 100], or nil for none.
   save_pictures: nil,
 
-  # Lower than what its kind can do, never higher.
+  # Lower than what its body can do, never higher.
   limits: [
     # max_turn: 1.0,                       # rad/s; an ATRV mini 0.8
     # max_acceleration: 0.5,               # m/s2, also of braking
@@ -118,6 +125,7 @@
 
   # How it meets the others.
   network: [
+    # fleet: ["mag1", "mag2"],             # the names of all robots; mag1 to mag100 and min1 to min100, unless given
     # secret_file: "/etc/convoy/secret",   # stands above CONVOY_SECRET_FILE; best left out
     # interface: "wlan0",                  # the network card, or the address as "10.0.0.11", to use; all, unless given
     # port: 4370,                          # UDP

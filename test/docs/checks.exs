@@ -100,6 +100,8 @@ defmodule Docs.Checks do
 
   # How blocks begin that nobody types.
   @shown [
+    "config/robots/rex.exs:3: profile: config/bodies/rover.exs:8",
+    "network: [fleet: [\"mag1\"",
     "52.3 s replayed: all 11665 decisions on",
     "live.mcap: 2 live robots",
     "wishes, the strongest first:",

@@ -29,7 +29,9 @@ defmodule Player do
     Unsupported
   }
 
+  alias Hal.RobotName
   alias Player.Writer
+  alias Robot.File.Bodies
 
   @drivers %{
     "rflex" => :drive,
@@ -46,7 +48,7 @@ defmodule Player do
   @type result :: %{
           text: String.t(),
           id: atom(),
-          profile: :magellan | :atrv_mini,
+          profile: body :: atom(),
           assumed: [State.remark()],
           left: [State.remark()]
         }
@@ -55,8 +57,8 @@ defmodule Player do
   The robot file for a configuration file's text. Options:
 
     * `:file` - its name, for errors and the head of the new file
-    * `:id` - the robot's name; default `mag1` or `min1`
-    * `:profile` - `:magellan` or `:atrv_mini`; by default guessed
+    * `:id` - the robot's name; default that of its body with a 1, such as `mag1`
+    * `:profile` - the name of a body (`Robot.File.Bodies`); by default guessed, `:magellan` or `:atrv_mini`
     * `:version` - 1 or 2 (and later) for Player's; by default found out from the names of its
       options
     * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: the path of
@@ -201,7 +203,7 @@ defmodule Player do
   end
 
   defp result(state, profile, file, options) do
-    id = options[:id] || if(profile == :magellan, do: :mag1, else: :min1)
+    id = options[:id] || hd(RobotName.numbered(Bodies.short(profile), 1))
 
     %{
       text: write(state, file, id, profile, @modules),

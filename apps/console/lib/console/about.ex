@@ -5,7 +5,6 @@ defmodule Console.About do
   alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names, Percept}
   alias Robot.Control.Controller
-  alias Lab.Trial.Setup
   alias Swarm.{Member, Status}
   alias Swarm.Status.{Sight, Words}
 
@@ -18,14 +17,13 @@ defmodule Console.About do
   @doc "For the page; `nil` for a robot that is not on this node, or is dead."
   @spec of(atom()) :: t() | nil
   def of(robot) do
-    with {:ok, board} <- Board.find(robot) do
-      entries = Board.entries(board)
-      mission = with {%{mission: mission}, _age_ms} <- entries[:release], do: mission
-
+    with {:ok, board} <- Board.find(robot),
+         entries = Board.entries(board),
+         {%{mission: mission, profile: profile}, _age_ms} <- entries[:release] do
       # No driver is asked for its words here.
       config = %{
         id: robot,
-        profile: Setup.profile(robot),
+        profile: profile,
         start: Pose.new(0, 0),
         mission: mission,
         drive: {nil, []},
@@ -40,7 +38,7 @@ defmodule Console.About do
         camera: Names.whereis(robot, :view) != nil
       })
     else
-      :error -> nil
+      _no_board_or_not_yet -> nil
     end
   end
 

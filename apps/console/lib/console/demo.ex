@@ -142,13 +142,13 @@ defmodule Console.Demo do
   @doc """
   The first line of a run: the robots, the map, whether grey in its picture was taken for wall, the seed and the formation, or
   the mission; and where landmark and robots stand, if that was chosen: on a built-in map, whose middle is known, only of a
-  landmark that is not there.
+  landmark that is not there; and which bodies see nothing ahead.
   """
   @spec heading(Options.t(), Scene.t()) :: String.t()
   def heading(options, scene) do
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
       "#{options.map}#{MapName.grey(scene, "--grey floor")}, seed #{options.seed}, " <>
-      task(options, scene) <> places(options, scene)
+      task(options, scene) <> places(options, scene) <> unseeing(options.robots)
   end
 
   defp task(%{mission: {module, _own}}, _scene) when module != Missions.Landmark,
@@ -167,6 +167,12 @@ defmodule Console.Demo do
         do: "; #{starts(for robot <- scene.robots, do: Pose.point(robot.pose))}",
         else: ""
       )
+  end
+
+  defp unseeing(robots) do
+    {:ok, bodies} = Lab.Trial.Options.bodies(robots, [])
+    kinds = robots |> Enum.map(&bodies[&1]) |> Enum.uniq()
+    for body <- kinds, line = Robot.File.Warnings.blind(body), into: "", do: "; #{line}"
   end
 
   defp starts([place]), do: "the robot starts at #{place(place)}"

@@ -1,9 +1,13 @@
 defmodule Console.Fleet do
   @moduledoc """
-  Reads a fleet and its formation, and names its robots: `mag1`, `mag2`, … (Magellan Pro) and `min1`, `min2`, … (ATRV mini). Pure.
+  Reads a fleet and its formation, and names its robots after their bodies: `mag1`, `burger1`, `burger2`, … Pure but for
+  the names of bodies in `config/bodies`.
   """
 
   alias Hal.Cli.Parse
+  alias Hal.Options.Suggest
+  alias Hal.RobotName
+  alias Robot.File.Bodies
   alias Swarm.Formation
 
   @most 1_000
@@ -17,7 +21,7 @@ defmodule Console.Fleet do
   @spec of(1..1_000) :: [atom()]
   def of(count) when count in 1..@most do
     mini = div(count, 2)
-    names("mag", count - mini) ++ names("min", mini)
+    RobotName.numbered("mag", count - mini) ++ RobotName.numbered("min", mini)
   end
 
   @doc """
@@ -25,22 +29,39 @@ defmodule Console.Fleet do
 
       iex> Console.Fleet.parse("mag:2,min:1")
       {:ok, [:mag1, :mag2, :min1]}
-      iex> Console.Fleet.parse("dog:2")
-      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to 1000 robots together"}
+      iex> Console.Fleet.parse("create2:2,burger:1")
+      {:ok, [:burger1, :create2_1, :create2_2]}
+      iex> {:error, {allowed, hint}} = Console.Fleet.parse("buger:2")
+      iex> {String.starts_with?(allowed, "such as burger:4,mag:2, with bodies burger, mag, min, "), hint}
+      {true, "; did you mean burger?"}
   """
-  @spec parse(String.t()) :: {:ok, [atom()]} | {:error, String.t()}
+  @spec parse(String.t()) :: {:ok, [atom()]} | {:error, Hal.Cli.Arguments.allowed()}
   def parse(text) do
     parts = text |> String.split(",") |> Enum.map(&String.split(&1, ":"))
-    kinds = for [kind, _count] <- parts, do: kind
-
+    kinds = for [kind | _count] <- parts, do: kind
     counts = for [_kind, count] <- parts, {:ok, n} <- [Parse.whole(count, 0..@most)], do: n
+    known = Bodies.names()
+    strange = Enum.find(kinds, &(&1 not in known))
 
-    if length(counts) == length(parts) and kinds -- ["mag", "min"] == [] and
+    if length(counts) == length(parts) and strange == nil and kinds == Enum.uniq(kinds) and
          Enum.sum(counts) in 1..@most do
-      {:ok, kinds |> Enum.zip(counts) |> Enum.sort() |> Enum.flat_map(&names/1)}
+      named(kinds |> Enum.zip(counts) |> Enum.sort())
     else
-      {:error, "such as mag:4,min:2 (kinds mag and min), 1 to #{@most} robots together"}
+      hint = if strange, do: Suggest.hint(strange, known), else: ""
+
+      {:error,
+       {"such as burger:4,mag:2, with bodies #{Enum.join(known, ", ")}, each once, and 1 to #{@most} robots together,",
+        hint}}
     end
+  end
+
+  # At most a thousand, of bodies that there are, so these atoms are bounded.
+  defp named(kinds) do
+    names = Enum.flat_map(kinds, fn {kind, count} -> RobotName.numbered(kind, count) end)
+
+    if Enum.all?(names, &RobotName.valid?/1),
+      do: {:ok, names},
+      else: {:error, "a body whose name leaves room for a number within 31 letters,"}
   end
 
   @doc """
@@ -52,18 +73,12 @@ defmodule Console.Fleet do
   @spec describe([atom()]) :: String.t()
   def describe(robots) do
     robots
-    |> Enum.map(&Atom.to_string/1)
-    |> Enum.chunk_by(&String.slice(&1, 0, 3))
+    |> Enum.chunk_by(&RobotName.kind/1)
     |> Enum.map_join(", ", fn
-      [only] -> only
+      [only] -> "#{only}"
       names -> "#{hd(names)} to #{List.last(names)}"
     end)
   end
-
-  defp names({kind, count}), do: names(kind, count)
-
-  # At most a thousand names of each kind exist, so these atoms are bounded.
-  defp names(kind, count), do: for(k <- 1..count//1, do: :"#{kind}#{k}")
 
   @doc "The formations by name."
   @spec formations() :: [String.t()]
@@ -93,7 +108,7 @@ defmodule Console.Fleet do
       {:ok, {known, spacing}}
     else
       {:kind, false} ->
-        {:error, {Parse.either(formations()), Hal.Options.Suggest.hint(kind, formations())}}
+        {:error, {Parse.either(formations()), Suggest.hint(kind, formations())}}
 
       {:error, _} ->
         {:error, "KIND:SPACING with a spacing from 0.8 to 5 metres"}

@@ -146,8 +146,10 @@ defmodule Console.Options do
 
   defp table(folder) do
     [
-      {"robots", "N", &Parse.whole(&1, 1..1_000), "how many robots, 1 to 1000 (6)"},
-      {"fleet", "mag:N,min:N", &Fleet.parse/1, "or how many of each kind"},
+      {"robots", "N", &Parse.whole(&1, 1..1_000),
+       "how many robots, 1 to 1000, half of them Magellans and half ATRV minis (6)"},
+      {"fleet", "BODY:N,…", &Fleet.parse/1,
+       "or how many of each body, such as burger:4,mag:2:\nmag (magellan), min (atrv_mini), burger, waffle (turtlebot3_…),\ncreate2, kobuki, pioneer3, or a file config/bodies/NAME.exs"},
       {"seed", "S", &Parse.whole(&1, 0..4_294_967_295),
        "of all randomness; the same seed gives the same run (1)"},
       {"map", "NAME", &MapName.parse(&1, folder),
@@ -184,8 +186,8 @@ defmodule Console.Options do
 the prompt then takes pause, step, speed"},
       {"nodes", nil, nil,
        "each robot and the world in a process of its own, a node\nto attach to, to kill -9 and to kill -STOP"},
-      {"hardware", "N|mag:N,min:N", &hardware/1,
-       "this many robots, or this many of each kind, use the drivers of real ones\nand devices emulated on serial lines (0)"},
+      {"hardware", "N|BODY:N,…", &hardware/1,
+       "this many robots, or this many of each body, use the drivers of real ones\nand devices emulated on serial lines: of mag and min (0)"},
       {"json", "FILE|-", &file(&1, "", folder), "write the report (- is standard output)"},
       {"picture", "FILE.svg", &file(&1, ".svg", folder),
        "draw the paths and the formation error"},
@@ -340,16 +342,14 @@ the prompt then takes pause, step, speed"},
   defp hardware(text) do
     with {:error, _allowed} <- Parse.whole(text, 0..100),
          {:error, _allowed} <- Fleet.parse(text) do
-      {:error, {"a whole number, or such as mag:1,min:1 (kinds mag and min),", kind_hint(text)}}
+      {:error, {"a whole number, or such as mag:1,min:1,", kind_hint(text)}}
     end
   end
 
-  # What people may type instead: a kind without a number, or a robot's name.
+  # What people may type instead: a body without a number, or a robot's name.
   defp kind_hint(text) do
-    case Regex.run(~r/^(mag|min)(\d*)$/, text) do
-      [_all, kind, _number] -> "; did you mean #{kind}:1?"
-      nil -> ""
-    end
+    kind = Hal.RobotName.kind(text)
+    if kind in Robot.File.Bodies.names(), do: "; did you mean #{kind}:1?", else: ""
   end
 
   defp who(""), do: {:error, "a name"}

@@ -292,7 +292,7 @@ export class FloorView {
     c.globalAlpha = r.alive ? 1 : 0.35;
     c.fillStyle = ink;
     c.beginPath();
-    c.arc(x, y, radius, 0, 7);
+    this.outline(c, r, x, y, radius);
     c.fill();
     c.strokeStyle = theme("--text");
     c.lineWidth = r.leader ? 3 : 1;
@@ -310,6 +310,14 @@ export class FloorView {
       c.stroke();
     }
     c.globalAlpha = 1;
+  }
+
+  // A disc, or a box whose corners are in the robot's own frame.
+  outline(c, r, x, y, radius) {
+    if (!r.box?.length) return c.arc(x, y, radius, 0, 7);
+    const [scale, cos, sin] = [radius / r.r, Math.cos(r.a), Math.sin(r.a)];
+    for (const [ahead, left] of r.box) c.lineTo(x + scale * (ahead * cos - left * sin), y - scale * (ahead * sin + left * cos));
+    c.closePath();
   }
 
   // Names above the robots, over whatever is behind them; below, where there is a name already.

@@ -29,13 +29,13 @@ defmodule Console.AboutTest do
 
   # The board of a robot on this node, whose parts have written this.
   defp board(id, entries) do
-    config =
-      Robot.Config.new!(id: id, profile: Hal.Profile.magellan(), drive: {Hal.FakeDrive, []})
-
+    profile = Hal.Profile.magellan()
+    config = Robot.Config.new!(id: id, profile: profile, drive: {Hal.FakeDrive, []})
     start_supervised!({Board, config})
     board = Board.find!(id)
+    release = {:comms, :release, %{mission: nil, replace: false, profile: profile}}
 
-    for {writer, key, value} <- entries,
+    for {writer, key, value} <- [release | entries],
         do: Board.put(board, writer, key, value, Board.now(board))
 
     board

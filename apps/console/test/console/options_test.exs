@@ -64,7 +64,7 @@ defmodule Console.OptionsTest do
 
     for wrong <- ~w(-1 1.5 dog:1 mag:x 101 nan) do
       assert error("--hardware #{wrong}") ==
-               "--hardware: expected a whole number, or such as mag:1,min:1 (kinds mag and min), got #{inspect(wrong)}"
+               "--hardware: expected a whole number, or such as mag:1,min:1, got #{inspect(wrong)}"
     end
 
     for {line, asked} <- [
@@ -75,6 +75,29 @@ defmodule Console.OptionsTest do
         ] do
       assert error(line) =~ "--hardware #{asked} is more than there are: the fleet is mag1"
     end
+  end
+
+  test "a fleet has any bodies, each once, and the demo runs them" do
+    assert {:ok, options} = parse("--fleet burger:2,mag:2,create2:1")
+    assert options.robots == [:burger1, :burger2, :create2_1, :mag1, :mag2]
+    assert {:ok, %{options: %{bodies: bodies}}} = Lab.Trial.setup(Options.trial(options))
+    assert bodies.burger2.name == :turtlebot3_burger and bodies.create2_1.name == :create2
+
+    for wrong <- [
+          "burger",
+          "burger:x",
+          "burger:0",
+          "mag:1,mag:1",
+          "mag:1001",
+          "rover:2",
+          ":2",
+          "burger:2,"
+        ] do
+      assert error("--fleet #{wrong}") =~
+               ~r/^--fleet: expected such as burger:4,mag:2, with bodies burger, .*, each once, and 1 to 1000 robots together, got /
+    end
+
+    assert error("--fleet buger:2") =~ ~s(got "buger:2"; did you mean burger?)
   end
 
   test "without options there are six robots in the hall" do

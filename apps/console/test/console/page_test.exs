@@ -106,6 +106,13 @@ defmodule Console.PageTest do
     end
   end
 
+  test "it is told the corners of boxes, and none of round bodies" do
+    {:ok, trial} = Lab.Trial.new(%{robots: [:mag1, :burger1], seed: 1})
+    json = trial |> Lab.Trial.scene() |> Page.State.scene(nil, nil, 0)
+    assert json =~ ~s("box":[],)
+    assert json =~ ~s("box":[[0.037)
+  end
+
   describe "in a browser" do
     @describetag skip: @server || Browser.why_not()
 

@@ -53,6 +53,17 @@ defmodule Console.PictureTest do
     assert count(document, "//text[.='plan known, noise off']") == 1
   end
 
+  test "round bodies are discs, and boxes are boxes" do
+    document =
+      "--fleet burger:1,mag:1,min:1 --landmark none --duration 5"
+      |> Runs.track()
+      |> Picture.draw({"", ""})
+      |> parse()
+
+    # Where it started, and where it is.
+    assert count(document, "//polygon") == 2 * 2
+  end
+
   test "fleets of one and of a hundred, with and without a landmark" do
     for line <- ["--robots 1", "--robots 100 --duration 20", "--landmark none --duration 20"] do
       track = Runs.track(line)

@@ -29,6 +29,8 @@ defmodule Console.FakeTrial do
     landmark = %{none: nil, default: {0.0, 0.0}}[options.landmark] || point(options.landmark)
     count = length(options.robots)
 
+    {:ok, bodies} = Lab.Trial.Options.bodies(options.robots, [])
+
     robots =
       for {id, k} <- Enum.with_index(options.robots) do
         angle = 2.4 * k + options.seed
@@ -39,6 +41,7 @@ defmodule Console.FakeTrial do
           id: id,
           pose: pose,
           radius: 0.25,
+          corners: Hal.Profile.corners(bodies[id]),
           alive: true,
           state: :search,
           slot: nil,

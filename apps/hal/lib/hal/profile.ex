@@ -1,14 +1,35 @@
 defmodule Hal.Profile do
   @moduledoc """
-  Describes the body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in `base_link`.
+  Describes the body of a kind of robot: geometry, sensors, limits. SI units; sensor poses are in `base_link`, whose origin is
+  the middle between the wheels. Nothing is decided by its `name`, which is for people and for configurations.
 
+  The two bodies of the thesis are here, because the driver of their base is; `Robot.File.Body` has all.
   Sources: the thesis and the public rFLEX sample configurations. The accelerations
   are our choice: 0.5 m/s2 and 1 rad/s2 for both bases, unless configured.
 
+  A body is round, or a box of `length` by `width` whose middle is `offset` ahead of `base_link` (`round?/1`, `corners/1`).
+  `radius` is that of the circle round all of it, about `base_link`: what it needs to turn on the spot.
+
   `sonar_round_s` is how long the sonars take until each has fired and was reported, in seconds: so old is a range at most
   while none is lost. It is 0 if all fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`).
+
+  `bumpers` are so many segments round the body, the first ahead, of which those within `bumper_span` about it exist.
+  `camera` is `nil` for a body without one. `about` is what people call it, `mass` is in kg; `nil` if that is not known.
+  `rflex` says whose published wiring and conversions an rFLEX controller in it has, `nil` for none.
   """
   alias Hal.Pose
+
+  # A Sony EVI-D30, and pictures of a quarter of its size.
+  @camera %{
+    width: 320,
+    height: 240,
+    field_of_view: :math.pi() / 3,
+    mount_height: 0.6,
+    max_pan: 1.745,
+    max_tilt: 0.436,
+    pan_rate: 1.396,
+    tilt_rate: 0.873
+  }
 
   @enforce_keys [:name, :radius, :length, :width, :wheel_base, :max_linear, :max_turn, :sonars]
   defstruct @enforce_keys ++
@@ -16,6 +37,10 @@ defmodule Hal.Profile do
                 max_acceleration: 0.5,
                 max_turn_acceleration: 1.0,
                 height: 0.5,
+                offset: 0.0,
+                about: nil,
+                mass: nil,
+                rflex: nil,
                 sonar_min: 0.15,
                 sonar_max: 5.1,
                 sonar_cone: :math.pi() / 6,
@@ -23,24 +48,20 @@ defmodule Hal.Profile do
                 irs: [],
                 ir_max: 0.8,
                 bumpers: 16,
-                camera: %{
-                  width: 320,
-                  height: 240,
-                  field_of_view: :math.pi() / 3,
-                  mount_height: 0.6,
-                  max_pan: 1.745,
-                  max_tilt: 0.436,
-                  pan_rate: 1.396,
-                  tilt_rate: 0.873
-                }
+                bumper_span: 2 * :math.pi(),
+                camera: @camera
               ]
 
   @type t :: %__MODULE__{
-          name: :magellan | :atrv_mini,
+          name: atom(),
           radius: float(),
           length: float(),
           width: float(),
           height: float(),
+          offset: float(),
+          about: String.t() | nil,
+          mass: float() | nil,
+          rflex: :magellan | :atrv_mini | nil,
           wheel_base: float(),
           max_linear: float(),
           max_turn: float(),
@@ -54,7 +75,8 @@ defmodule Hal.Profile do
           irs: [Pose.t()],
           ir_max: float(),
           bumpers: 0..16,
-          camera: map()
+          bumper_span: float(),
+          camera: map() | nil
         }
 
   @doc """
@@ -69,6 +91,9 @@ defmodule Hal.Profile do
 
     %__MODULE__{
       name: :magellan,
+      about: "a Magellan Pro",
+      mass: 20.0,
+      rflex: :magellan,
       radius: 0.2,
       length: 0.4,
       width: 0.4,
@@ -102,6 +127,9 @@ defmodule Hal.Profile do
 
     %__MODULE__{
       name: :atrv_mini,
+      about: "an ATRV mini",
+      mass: 40.0,
+      rflex: :atrv_mini,
       radius: 0.292,
       length: 0.5,
       width: 0.3,
@@ -112,6 +140,35 @@ defmodule Hal.Profile do
         Enum.map(left, fn {x, y, angle} -> Pose.new(x, y, angle) end) ++
           Enum.map(left, fn {x, y, angle} -> Pose.new(x, -y, -angle) end)
     }
+  end
+
+  @doc "The camera of a body that says no more of it."
+  @spec camera() :: map()
+  def camera, do: @camera
+
+  @doc """
+  Whether the body is round, so that it turns on the spot without reaching further; a square box has corners farther off.
+
+      iex> Enum.map([Hal.Profile.magellan(), Hal.Profile.atrv_mini()], &Hal.Profile.round?/1)
+      [true, false]
+  """
+  @spec round?(t()) :: boolean()
+  def round?(%__MODULE__{length: length, width: width, radius: radius}),
+    do: length == width and radius < 0.7 * length
+
+  @doc """
+  The corners of a box in `base_link` (metres), from the left front one to the left; none of a round body.
+
+      iex> Hal.Profile.corners(Hal.Profile.atrv_mini())
+      [{0.25, 0.15}, {-0.25, 0.15}, {-0.25, -0.15}, {0.25, -0.15}]
+  """
+  @spec corners(t()) :: [Pose.point()]
+  def corners(%__MODULE__{length: length, width: width, offset: offset} = profile) do
+    {front, back, side} = {offset + length / 2, offset - length / 2, width / 2}
+
+    if round?(profile),
+      do: [],
+      else: [{front, side}, {back, side}, {back, -side}, {front, -side}]
   end
 
   # Index 11 points straight ahead, and indices grow clockwise (public sample configuration).

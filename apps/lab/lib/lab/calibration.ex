@@ -3,7 +3,7 @@ defmodule Lab.Calibration do
   Calibrates odometry in a simulated hall, in lockstep: one robot drives the courses that a real one would, by the same
   controller and reflexes, and its true pose is what a person would have measured. Pure.
 
-  Options of `new/1`: `profile` (`:magellan`), `seed` (0), `noise` (`:default`), `wheels` (errors
+  Options of `new/1`: `profile` (a Magellan), `seed` (0), `noise` (`:default`), `wheels` (errors
   of the odometry, as in `Sim.World.Body`), `speed` (m/s, 0.3), `tape_m` (standard deviation of a
   reading of the tape, 0.003) and `tape_rad` (the same for an angle, 0.009, half a degree).
   """
@@ -34,7 +34,7 @@ defmodule Lab.Calibration do
   def new(options) do
     options =
       Keyword.validate!(options,
-        profile: :magellan,
+        profile: Profile.magellan(),
         seed: 0,
         noise: :default,
         wheels: [],
@@ -44,7 +44,7 @@ defmodule Lab.Calibration do
       )
 
     {:ok, map} = Sim.Floorplan.open("hall", 6)
-    profile = if options[:profile] == :magellan, do: Profile.magellan(), else: Profile.atrv_mini()
+    profile = options[:profile]
     robot = %{id: @id, profile: profile, pose: Pose.new(0, 0), wheels: options[:wheels]}
 
     world = World.new!(map: map, robots: [robot], seed: options[:seed], noise: options[:noise])

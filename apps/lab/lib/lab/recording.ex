@@ -7,7 +7,7 @@ defmodule Lab.Recording do
 
   | topic | message |
   |---|---|
-  | `/convoy/start` | once: the version, and the start: world, robots, mission (`Lab.Trial.Setup`) |
+  | `/convoy/start` | once: the version, the names of robots and of bodies as text, and the start: world, robots with their bodies, mission (`Lab.Trial.Setup`) |
   | `/convoy/ticks` | each 100 ms: all inputs of the robots with their effects, and all interventions |
 
   A tick is written in a short form (`Record.Recording.Tick`), and without compression: that would cost
@@ -18,7 +18,7 @@ defmodule Lab.Recording do
   alias Lab.Trial
   alias Lab.Trial.Setup
 
-  @version 5
+  @version 6
   @start "/convoy/start"
   @ticks "/convoy/ticks"
   @encoding "erlang-term"
@@ -43,24 +43,31 @@ defmodule Lab.Recording do
 
   @doc "The content of the start's message."
   @spec start(Setup.t()) :: binary()
-  def start(%Setup{} = setup),
-    do:
-      :erlang.term_to_binary({:convoy, @version, %{setup | map: nil}}, [
-        :deterministic,
-        compressed: 1
-      ])
+  def start(%Setup{robots: robots} = setup) do
+    names = Enum.uniq(for %{id: id, profile: body} <- robots, name <- [id, body.name], do: name)
+    start = write(%{setup | map: nil})
+    write({:convoy, @version, Enum.map(names, &Atom.to_string/1), start})
+  end
+
+  defp write(term), do: :erlang.term_to_binary(term, [:deterministic, compressed: 1])
 
   @doc "The content of a tick's message."
   @spec tick(tick()) :: binary()
   def tick({at_ms, entries}),
     do: :erlang.term_to_binary({at_ms, Tick.pack(entries)}, [:deterministic])
 
-  @doc "The start from its message."
+  @doc "The start from its message, whose names become known to this program: a reader need not know the robots before."
   @spec read_start(binary()) :: {:ok, Setup.t()} | {:error, line :: String.t()}
   def read_start(bytes) do
     case Shared.read(bytes) do
-      {:ok, {:convoy, @version, %Setup{world: %{map: map}} = setup}} ->
-        {:ok, %{setup | map: map}}
+      {:ok, {:convoy, @version, names, start}} when is_binary(start) ->
+        with {:ok, _left} <- Shared.know(names),
+             {:ok, %Setup{world: %{map: map}} = setup} <- Shared.read(start) do
+          {:ok, %{setup | map: map}}
+        else
+          {:error, line} -> {:error, line}
+          _other -> Shared.refuse(:error, :convoy, @version)
+        end
 
       other ->
         Shared.refuse(other, :convoy, @version)

@@ -79,7 +79,7 @@ defmodule Lab.Scenario do
       about: {:check, &about?/1, "text of at most #{@longest} bytes, in quotes,"},
       robots:
         {:check, &Names.read/1,
-         "a number of robots, 1 to 100, or a list of names, [:mag1, :min1],"}
+         "a number of robots, 1 to 100, or a list of names, [:mag1, :burger1] or [\"rex\"] with bodies:,"}
     ] ++
       run ++
       [script: Event.script_type(), expect: Expectation.list_type()]

@@ -256,9 +256,10 @@ defmodule Lab.Trial do
     scenery = World.scenery(trial.world)
 
     each(trial, fn id, trial ->
-      if Faults.any?(trial.faults, [:blind], id, trial.at_ms),
-        do: trial,
-        else: input(trial, id, {:detections, Mechanics.detections(trial, id, scenery)})
+      if not World.camera?(trial.world, id) or
+           Faults.any?(trial.faults, [:blind], id, trial.at_ms),
+         do: trial,
+         else: input(trial, id, {:detections, Mechanics.detections(trial, id, scenery)})
     end)
   end
 

@@ -125,17 +125,24 @@ defmodule Lab.VirtualRobot do
         profile: robot.profile,
         start: robot.start,
         clock: common.clock,
-        camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]},
         colours: World.colours(),
         mission: common.mission,
         plan: common.plan,
         replace: true,
         trace: trace(common.trace, id)
-      ] ++ drivers(robot, device, common.folder)
+      ] ++ camera(robot.profile, device, common) ++ drivers(robot, device, common.folder)
     )
   end
 
+  defp camera(%{camera: nil}, _device, _common), do: []
+
+  defp camera(_profile, device, common),
+    do: [camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]}]
+
   defp drivers(%{hardware?: true} = robot, _device, folder), do: Hardware.drivers(robot, folder)
+
+  defp drivers(%{profile: %{camera: nil}}, device, _folder),
+    do: [drive: {Sim.Device.Drive, device}]
 
   defp drivers(_simulated, device, _folder),
     do: [drive: {Sim.Device.Drive, device}, ptz: {Sim.Device.Ptz, device}]

@@ -10,7 +10,6 @@ defmodule Lab.AstrayTest do
   alias Robot.Percept
   alias Robot.Behaviour.{Avoid, Goto}
   alias Robot.Safety.Reflex
-  alias Lab.Trial.Setup
   alias Sim.World
 
   @robots ~w(mag1 mag2 mag3 min1 min2 min3)a
@@ -19,11 +18,12 @@ defmodule Lab.AstrayTest do
   # Collisions, and the mean speed (m/s), in so many seconds.
   defp run(seed, seconds) do
     {:ok, map} = Sim.Floorplan.open("hall", length(@robots))
+    {:ok, profiles} = Lab.Trial.Options.bodies(@robots, [])
 
     bodies =
       for {id, k} <- Enum.with_index(@robots) do
         pose = Pose.new(-2.0 + 0.8 * k, rem(k, 2) * 0.9, 0.7 * k)
-        %{id: id, profile: Setup.profile(id), pose: pose}
+        %{id: id, profile: profiles[id], pose: pose}
       end
 
     {minds, random} = Enum.map_reduce(bodies, :rand.seed_s(:exsss, seed), &mind/2)

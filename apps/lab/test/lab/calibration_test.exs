@@ -68,7 +68,9 @@ defmodule Lab.CalibrationTest do
   end
 
   test "slip in turns is distinguished from wrong wheels" do
-    {_truth, _found, _squares, measured} = run([noise: :slip, profile: :atrv_mini, seed: 3], 1)
+    {_truth, _found, _squares, measured} =
+      run([noise: :slip, profile: Hal.Profile.atrv_mini(), seed: 3], 1)
+
     assert Calibration.slip(measured.angles) > 0.05
     {_truth, _found, _squares, measured} = run([wheels: @errors, seed: 3], 1)
     assert abs(Calibration.slip(measured.angles)) < 0.01

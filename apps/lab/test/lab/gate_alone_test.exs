@@ -8,7 +8,6 @@ defmodule Lab.GateAloneTest do
   @moduletag :slow
   alias Hal.{Pose, Twist}
   alias Robot.Safety.Reflex
-  alias Lab.Trial.Setup
   alias Sim.World
 
   @robots ~w(mag1 mag2 mag3 min1 min2 min3)a
@@ -21,11 +20,12 @@ defmodule Lab.GateAloneTest do
   # `round_s` is what the gate allows for; `at_once?` how the sonars fire.
   defp collisions(seed, speed, round_s, at_once?) do
     {:ok, map} = Sim.Floorplan.open("hall", length(@robots))
+    {:ok, profiles} = Lab.Trial.Options.bodies(@robots, [])
 
     bodies =
       for {id, k} <- Enum.with_index(@robots) do
         pose = Pose.new(-2.0 + 0.8 * k, rem(k, 2) * 0.9, 0.7 * k)
-        %{id: id, profile: Setup.profile(id), pose: pose}
+        %{id: id, profile: profiles[id], pose: pose}
       end
 
     world = World.new!(map: map, robots: bodies, seed: seed)

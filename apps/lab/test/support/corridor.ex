@@ -67,7 +67,10 @@ defmodule Lab.Corridor do
     options = %{robots: ids, map: "doorway", seed: seed, landmark: :none, blobs: :direct}
     kind = if plan == :sonar, do: :sonar, else: :known
     {:ok, setup} = Trial.setup(Map.merge(options, %{plan: kind, duration_s: 10_000}))
-    bodies = for {id, from, _} <- robots, do: %{id: id, profile: Setup.profile(id), pose: from}
+
+    bodies =
+      for {id, from, _} <- robots, do: %{id: id, profile: setup.options.bodies[id], pose: from}
+
     world = Sim.World.new!(map: map, seed: seed, noise: :default, robots: bodies)
 
     starts =
@@ -104,8 +107,7 @@ defmodule Lab.Corridor do
   defp gap(robots) do
     for a <- robots, b <- robots, a.id < b.id, reduce: 99.0 do
       gap ->
-        radii = Setup.profile(a.id).radius + Setup.profile(b.id).radius
-        min(gap, Pose.distance(a.pose, b.pose) - radii)
+        min(gap, Pose.distance(a.pose, b.pose) - a.radius - b.radius)
     end
   end
 end

@@ -5,6 +5,7 @@ defmodule Mesh.Environment do
 
   | variable | |
   |---|---|
+  | `CONVOY_FLEET` | `fleet`: names of robots, between commas or blanks |
   | `CONVOY_DIST_PORT` | `dist_port`: a TCP port |
   | `CONVOY_INTERFACE` | `interface`: an IPv4 address, or a network card |
   | `CONVOY_ALLOW` | `allow`: addresses and networks, between commas or blanks |
@@ -19,6 +20,7 @@ defmodule Mesh.Environment do
 
   # What a person writes: `:number` and `:words` say how the text becomes a value.
   @settings [
+    {"CONVOY_FLEET", :words, :fleet},
     {"CONVOY_DIST_PORT", :number, {:integer, 1, 65_535}},
     {"CONVOY_INTERFACE", :text, :interface},
     {"CONVOY_ALLOW", :words, :allow},

@@ -18,7 +18,7 @@ defmodule Mesh.Options do
   | `full_mesh` | up to this number of nodes each is connected to each; default 30 |
   | `degree` | above that, each is connected to about this many others, 2 to 30; default 8 |
   """
-  alias Hal.Options
+  alias Hal.{Options, RobotName}
   alias Mesh.{Interface, Secret, Strategy}
   alias Mesh.Distribution.Access.Networks
   alias Mesh.Protocol.Roster
@@ -61,6 +61,7 @@ defmodule Mesh.Options do
        1_000}
   ]
   @in_file [
+    :fleet,
     :secret_file,
     :interface,
     :port,
@@ -136,9 +137,9 @@ defmodule Mesh.Options do
     for place <- allow ++ peers, {:ok, network} <- [Networks.read(place)], do: network
   end
 
-  defp fleet(nil), do: {:ok, Roster.fleet()}
+  defp fleet(nil), do: {:ok, RobotName.usual()}
   defp fleet([_ | _] = names), do: {:ok, names}
-  defp fleet([]), do: Hal.Options.refuse("mesh", [:fleet], [], "one robot's name at least")
+  defp fleet([]), do: Options.refuse("mesh", [:fleet], [], "one robot's name at least")
 
   defp secret(%{secret: %Secret{} = secret}), do: {:ok, secret}
   defp secret(%{secret_file: nil}), do: Secret.from_env()

@@ -96,6 +96,30 @@ defmodule Mesh.PureTest do
         do: {name, Routing.onward(node_table.nodes[name])}
   end
 
+  test "the names of a fleet come as text from this machine's configuration, and from nowhere else" do
+    name = "rover_#{System.unique_integer([:positive])}"
+    secret = Mesh.Air.secret()
+    roster = Mesh.Protocol.Roster.new(:mag1@lab, Hal.RobotName.usual())
+    assert Mesh.Protocol.Roster.guest?(roster, name <> "@lab")
+    assert :error == Hal.ExternalTerm.atom(name)
+
+    assert Mesh.Environment.check(%{"CONVOY_FLEET" => "mag1, Rover"}) ==
+             {:error,
+              [~s(CONVOY_FLEET: expected a robot's name such as "mag1" or "rover_2", got "Rover")]}
+
+    assert :error == Hal.ExternalTerm.atom(name)
+
+    assert {:ok, %Options{fleet: [:mag1, rover]}} =
+             Options.new(secret: secret, fleet: ["mag1", name])
+
+    assert Atom.to_string(rover) == name
+    roster = Mesh.Protocol.Roster.new(:mag1@lab, [:mag1, rover])
+    assert Mesh.Protocol.Roster.robot?(roster, rover)
+    refute Mesh.Protocol.Roster.robot?(roster, :mag2)
+    assert {:ok, %Options{fleet: usual}} = Options.new(secret: secret)
+    assert usual == Hal.RobotName.usual() and length(usual) == 200
+  end
+
   test "options are checked by name" do
     secret = Mesh.Air.secret()
 
@@ -117,7 +141,7 @@ defmodule Mesh.PureTest do
           {[multicast: nil], ~r/mesh option multicast: expected .*, got nil/},
           {[fleet: []], ~r/mesh option fleet: expected .*, got \[\]/},
           {[fleet: [:"mag1\n"]], "mesh option fleet.1: expected"},
-          {[fleet: ["mag1"]], ~s(mesh option fleet.1: expected a robot's name such as :mag1)},
+          {[fleet: ["Mag1"]], ~s(mesh option fleet.1: expected a robot's name such as "mag1")},
           {[strategies: [String]],
            "mesh option strategies: expected {Module, options}, got String"},
           {[strategies: [{String, 1}]], "strategies names String, which is not a Mesh.Strategy"},

@@ -3,7 +3,6 @@ defmodule Swarm.MemberSpecTest do
   alias Robot.File.Schema
   alias Swarm.{Comms, Formation, MemberSpec}
   alias Mesh.Options
-  alias Mesh.Protocol.Roster
   alias Missions.Landmark
 
   @robots Path.expand("../../../../config/robots", __DIR__)
@@ -79,7 +78,7 @@ defmodule Swarm.MemberSpecTest do
              "mag1.exs:2: policies.formation: expected :column, :line, :wedge, :triangle, :diamond or :circle, got :colum; did you mean :column?",
              "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
              "mag1.exs:3: policies.of: expected a whole number from 1 to 1000 robots of the fleet, got 0",
-             "mag1.exs:4: network.zzz: is not known: allowed are secret_file, interface, port, multicast, peers, addresses, dist_port, allow, full_mesh, degree",
+             "mag1.exs:4: network.zzz: is not known: allowed are fleet, secret_file, interface, port, multicast, peers, addresses, dist_port, allow, full_mesh, degree",
              "mag1.exs:4: network.port: expected a whole number from 0 to 65535, got -1",
              "mag1.exs:5: network.multicast: expected a whole number from 1 to 65535, got 0",
              "mag1.exs:5: network.peers.1: expected address and port, such as \"10.0.0.7:4370\", got \"10.0.0.7\""
@@ -131,15 +130,36 @@ defmodule Swarm.MemberSpecTest do
     end
   end
 
-  test "a file knows the same robots as the mesh" do
-    assert Schema.fleet() == Roster.fleet()
+  test "a fleet of other names is listed in the file, with the robot's own" do
+    assert {:ok, file} = parse(~s(network: [fleet: ["mag1", "rover_of_the_lab"]]))
+    assert [:mag1, rover] = MemberSpec.mesh(file)[:fleet]
+    assert Atom.to_string(rover) == "rover_of_the_lab"
+    assert {:ok, _config} = MemberSpec.config(file)
+
+    assert {:ok, file} = parse(~s(network: [fleet: ["rover_of_the_lab"]]))
+
+    assert MemberSpec.config(file) ==
+             {:error,
+              "network.fleet: expected all robots of the fleet, with mag1, whose file it is"}
+
+    assert {:error, [line]} = parse(~s(network: [fleet: ["Rover"]]))
+
+    assert line =~
+             ~s(network.fleet.1: expected a robot's name such as "mag1" or "rover_2", got "Rover")
   end
 
   test "template and guide describe every key" do
     template = File.read!(Path.join(@robots, "template.exs"))
     guide = File.read!(Path.expand("../../../../docs/robots.md", __DIR__))
 
-    context = %{fleet: Schema.fleet(), colours: nil, map: nil, tables: MemberSpec.tables()}
+    context = %{
+      bodies: nil,
+      bodiless?: true,
+      colours: nil,
+      map: nil,
+      tables: MemberSpec.tables()
+    }
+
     missions = [:mission | Keyword.keys(Landmark.option_table())]
 
     for key <- all_keys(Schema.table(context)) ++ missions do

@@ -18,7 +18,7 @@ defmodule Record.Recording do
   alias Record.Replay
   alias Record.Replay.Roles
 
-  @version 6
+  @version 7
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"
@@ -69,7 +69,7 @@ defmodule Record.Recording do
   def read_robots(bytes, left \\ Names.most()) do
     case read(bytes) do
       {:ok, {:convoy_robots, @version, names, robots}} when is_binary(robots) ->
-        with {:ok, left} <- Names.know(names, left),
+        with {:ok, left} <- know(names, left),
              {:ok, %{} = robots} <- read(robots),
              true <- Enum.all?(robots, &robot?/1) do
           {:ok, robots, left}
@@ -82,6 +82,17 @@ defmodule Record.Recording do
         refuse(other, :convoy_robots, @version)
     end
   end
+
+  @doc """
+  Makes the names of a recording, which it has as text, known to this program; at most `left` may be new. Returns how many may be
+  after that; the error is one line.
+
+      iex> Record.Recording.know(["ok", "nil"])
+      {:ok, 1_000}
+  """
+  @spec know(names :: term(), left :: non_neg_integer()) ::
+          {:ok, left :: non_neg_integer()} | {:error, line :: String.t()}
+  def know(names, left \\ Names.most()), do: Names.know(names, left)
 
   @doc """
   What is wrong with the first message of a recording (`read/1`), which is no tuple of this name and this version.

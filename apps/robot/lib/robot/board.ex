@@ -32,7 +32,7 @@ defmodule Robot.Board do
   | `:asking` | `:pilot` | while a callback of the mission runs (5) |
   | `:uncertainty` | `:executive` | that of the pose: `t:Robot.Percept.uncertainty/0` |
   | `:mission` | `:pilot` | the state of the mission and its claim (6) |
-  | `:release` | `:comms` | `%{mission: mission of its config, replace: whether it may be replaced}` |
+  | `:release` | `:comms` | `%{mission: mission of its config, replace: whether it may be replaced, profile: its body}` |
   | `:replaced` | `:replacement` | what has been put in the place of that (7) |
 
     1. As its one owner publishes it: the tags of the stops that hold the robot, those that were

@@ -16,8 +16,8 @@ defmodule Robot.File do
   A person arms a real robot by hand: `arm: :manual` is the default here, but not in
   `Robot.Config`.
   """
-  alias Hal.{Pose, Profile}
-  alias Robot.File.{Device, Reader, Schema, Terms}
+  alias Hal.{Pose, Profile, RobotName}
+  alias Robot.File.{Bodies, Body, Device, Reader, Schema, Terms}
   alias Nav.MapFile
   alias Hal.Options.Suggest
 
@@ -86,8 +86,7 @@ defmodule Robot.File do
 
   @doc """
   The robot of the file at `path`, or the problems with it. The paths of a colour file and of a map are relative
-  to the robot file's folder. `fleet:` are the allowed names (default
-  `Robot.File.Schema.fleet/0`). `tables:` are the types (`Hal.Options.Type`) of the keys that an
+  to the robot file's folder; the files of bodies are where `Robot.File.Bodies.folders/1` says. `tables:` are the types (`Hal.Options.Type`) of the keys that an
   app above this one defines (`network:` and `policies:`, see `Swarm.MemberSpec.load/1`); such a
   key without a type may have any keys and values.
 
@@ -104,13 +103,15 @@ defmodule Robot.File do
       end
 
       map = &MapFile.open(Path.expand(&1, folder))
-      parse(text, Keyword.merge([file: path, colours: read, map: map], options))
+      bodies = &Bodies.fetch(&1, Bodies.folders(path))
+      given = [file: path, colours: read, map: map, bodies: bodies]
+      parse(text, Keyword.merge(given, options))
     end
   end
 
   @doc """
-  The robot that a text describes. Options: `file:`, its name in error messages; `fleet:` and
-  `tables:` as in `load/2`; `colours:`, a function of path and options that reads a colour file
+  The robot that a text describes. Options: `file:`, its name in error messages; `tables:` as in `load/2`; `bodies:`, a
+  function that finds a body by its name (`t:Robot.File.Schema.bodies/0`; default those that come along); `colours:`, a function of path and options that reads a colour file
   (`t:Robot.File.Colours.reader/0`); `map:`, a function of a path that reads a map (`t:Robot.File.Map.reader/0`).
 
       iex> Robot.File.parse("[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, port: \\"/dev/ttyR0\\"}, arm: :manaul]", file: "mag1.exs")
@@ -122,7 +123,8 @@ defmodule Robot.File do
     file = Keyword.get(options, :file, "robot file")
 
     context = %{
-      fleet: Keyword.get_lazy(options, :fleet, &Schema.fleet/0),
+      bodies: Keyword.get(options, :bodies, &Bodies.fetch(&1, [])),
+      bodiless?: true,
       tables: Keyword.get(options, :tables, []),
       colours:
         Keyword.get(options, :colours, fn _path, _options -> {:error, "no files here"} end),
@@ -131,8 +133,9 @@ defmodule Robot.File do
 
     with {:ok, {_line, value} = tree} <- Reader.read(text),
          :ok <- whole(value),
+         context = %{context | bodiless?: not key?(value, "body")},
          {:ok, values} <- Terms.check(tree, Schema.table(context)),
-         robot = robot(values),
+         {:ok, robot} <- robot(values, tree),
          [] <- Terms.at(problems(robot, file), tree) do
       {:ok, robot}
     else
@@ -162,14 +165,23 @@ defmodule Robot.File do
   defp whole({:list, []}), do: :ok
   defp whole(_other), do: {:error, {1, "a robot file is one list, [key: value, …]"}}
 
-  defp robot(values) do
-    {body, values} = Keyword.pop(values, :body, [])
-    profile = Schema.profile(values[:profile], body)
+  defp key?({:keys, keys}, name), do: List.keymember?(keys, name, 0)
+  defp key?({:list, []}, _name), do: false
 
-    struct!(
-      __MODULE__,
-      values |> Keyword.put(:profile, profile) |> Keyword.put_new(:start, Pose.new(0, 0))
-    )
+  # Without a `profile:` the body must be whole.
+  defp robot(values, tree) do
+    {body, values} = Keyword.pop(values, :body, [])
+
+    case Body.build(values[:id], body, values[:profile]) do
+      {:ok, profile} ->
+        values =
+          values |> Keyword.put(:profile, profile) |> Keyword.put_new(:start, Pose.new(0, 0))
+
+        {:ok, struct!(__MODULE__, values)}
+
+      {:error, problems} ->
+        {:error, Terms.at(for({path, text} <- problems, do: {["body" | path], text}), tree)}
+    end
   end
 
   # Checks of a robot file that involve several keys. Pure.
@@ -190,16 +202,22 @@ defmodule Robot.File do
   end
 
   # If a file is copied for another robot and its id is not changed, two robots have the same
-  # name.
+  # name. A file with a name of no such form, such as a template, may be named otherwise.
   defp named(robot, file) do
     name = Path.basename(file, ".exs")
+    usual? = Enum.any?(RobotName.usual(), &(Atom.to_string(&1) == name))
+    numbered? = RobotName.kind(name) == RobotName.kind(robot.id) and RobotName.kind(name) != name
 
-    if Enum.any?(Schema.fleet(), &(Atom.to_string(&1) == name and &1 != robot.id)),
+    if (usual? or numbered?) and name != Atom.to_string(robot.id),
       do: {["id"], "is #{inspect(robot.id)}, but the file is named #{name}.exs"}
   end
 
   defp seen(%{camera: camera, colours: nil}) when camera != nil,
     do: {["colours"], "is missing: a robot with a camera must have colours"}
+
+  defp seen(%{camera: camera, profile: %{camera: nil} = body}) when camera != nil,
+    do:
+      {["camera"], "is for a body with a camera, and #{body.name} has none: body: [camera: […]]"}
 
   defp seen(_robot), do: nil
 

@@ -2,6 +2,8 @@ defmodule Robot.FileTest do
   use ExUnit.Case, async: true
 
   doctest Robot.File
+  doctest Robot.File.Bodies
+  doctest Robot.File.Body
   doctest Robot.File.Reader
   doctest Robot.File.RecordOptions
   doctest Robot.File.Summary
@@ -142,7 +144,9 @@ defmodule Robot.FileTest do
     body: [radius: 90]
     """
 
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, map: nil, tables: []})
+    {:keys, table} =
+      Schema.table(%{bodies: nil, bodiless?: true, colours: nil, map: nil, tables: []})
+
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines(text) == [

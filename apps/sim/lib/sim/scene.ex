@@ -22,7 +22,8 @@ defmodule Sim.Scene do
               ]
 
   @typedoc """
-  One robot. `slot` is its place in the formation relative to the leader's true pose; `size_ppm`
+  One robot. `radius` is that of the circle round it, `corners` are those of a box, in its own frame (`Hal.Profile.corners/1`).
+  `slot` is its place in the formation relative to the leader's true pose; `size_ppm`
   is the share of its picture that the landmark fills, in parts per million, and `nil` while it
   does not see it. By its own estimate the robot is within `uncertainty` metres of where it
   believes to be (`believed`, in the frame of its estimate) in 95 of 100 cases, `nil` if it does not know. `blocked_by` and
@@ -32,6 +33,7 @@ defmodule Sim.Scene do
           required(:id) => atom(),
           required(:pose) => Pose.t(),
           required(:radius) => float(),
+          optional(:corners) => [Pose.point()],
           required(:alive) => boolean(),
           required(:state) => atom(),
           required(:slot) => Pose.point() | nil,

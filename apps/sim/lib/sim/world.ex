@@ -172,6 +172,11 @@ defmodule Sim.World do
     end
   end
 
+  @doc "Whether a robot has a camera; one that has none has neither detections nor frames."
+  @spec camera?(t(), id()) :: boolean()
+  def camera?(%__MODULE__{} = world, id),
+    do: Elixir.Map.fetch!(world.robots, id).field_of_view != nil
+
   @doc "The blobs of a robot's picture by geometry, without painting it."
   @spec blobs(t(), id(), scenery() | nil) :: [Vision.Blob.t()]
   def blobs(%__MODULE__{} = world, id, scenery \\ nil) do

@@ -76,11 +76,20 @@ defmodule Swarm.MemberSpec do
   @doc "The configuration that the robot is started with; an error is one line."
   @spec config(Robot.File.t()) :: {:ok, Robot.Config.t()} | {:error, line :: String.t()}
   def config(%Robot.File{} = file) do
-    with {:ok, mission} <- mission(file.policies),
+    with :ok <- listed(file),
+         {:ok, mission} <- mission(file.policies),
          {:ok, recorder} <- recorder(file),
          {:ok, config} <- Robot.File.config(file) do
       {:ok, config |> recorded(recorder) |> Map.put(:mission, mission) |> Comms.join()}
     end
+  end
+
+  # The others would not hear it.
+  defp listed(%{id: id, network: network}) do
+    if id in Keyword.get(network, :fleet, [id]),
+      do: :ok,
+      else:
+        {:error, "network.fleet: expected all robots of the fleet, with #{id}, whose file it is"}
   end
 
   defp recorded(config, nil), do: config

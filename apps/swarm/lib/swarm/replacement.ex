@@ -64,7 +64,7 @@ defmodule Swarm.Replacement do
   @doc "The effects with which its comms starts: what the robot's config says comes on its board."
   @spec present(Robot.Config.t()) :: [Role.effect()]
   def present(config) do
-    about = %{mission: config.mission, replace: config.replace}
+    about = %{mission: config.mission, replace: config.replace, profile: config.profile}
     [{:put, :release, about}]
   end
 

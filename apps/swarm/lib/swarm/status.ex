@@ -44,6 +44,8 @@ defmodule Swarm.Status do
   (`Swarm.Membership.Peers`). The line names the robots that it knows only by way of others as not
   heard. `Swarm.matrix/0` shows the same for all robots as a table.
 
+  `body` is its shape, which a row does not have.
+
   After the age stands where its camera looks (`head`), and what that shows of the landmark (`sees`; `Swarm.Status.Sight`), of
   robots that have a pan-tilt unit and a camera: `looks at 12, 0 deg (zoom 49 deg), sees YellowLandmark at -12 deg, 2.31 m`.
 
@@ -68,6 +70,7 @@ defmodule Swarm.Status do
   @fields [
     from: {:robot, nil},
     node: {nil, :name},
+    body: {nil, nil},
     state: {:idle, :name},
     by: {nil, :word},
     weights: {[], nil},
@@ -109,11 +112,14 @@ defmodule Swarm.Status do
   @enforce_keys [:robot]
   defstruct @enforce_keys ++ for({name, {default, _sent}} <- @fields, do: {name, default})
 
+  @typedoc "Its shape: the circle round it, and the corners of a box (`Hal.Profile.corners/1`), metres."
+  @type body :: %{radius: float(), corners: [Pose.point()]}
   @type view :: {number :: non_neg_integer(), members :: [atom()]}
   @type t :: %__MODULE__{
           robot: atom(),
           from: :robot | :row,
           node: node() | String.t() | nil,
+          body: body() | nil,
           state: atom() | String.t(),
           by: atom() | String.t(),
           weights: [{by :: atom(), weight :: float()}],
@@ -168,7 +174,8 @@ defmodule Swarm.Status do
   without what its comms alone knows, such as `hears`. The config may be what of it is needed.
   """
   @spec of_board(
-          Robot.Config.t() | %{id: atom(), start: Pose.t(), drive: {nil, []}},
+          Robot.Config.t()
+          | %{id: atom(), profile: Hal.Profile.t(), start: Pose.t(), drive: {nil, []}},
           %{term() => {term(), age_ms :: integer()}},
           Board.t() | Board.entries()
         ) :: t()
@@ -180,6 +187,10 @@ defmodule Swarm.Status do
 
   defp read(:from, _seen), do: :robot
   defp read(:node, _seen), do: node()
+
+  defp read(:body, %{config: %{profile: profile}}),
+    do: %{radius: profile.radius, corners: Hal.Profile.corners(profile)}
+
   defp read(:network, _seen), do: Mesh.fault()
   defp read(:state, %{entries: entries}), do: entries |> value(:mission) |> state()
 

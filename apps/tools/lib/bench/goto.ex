@@ -59,8 +59,8 @@ defmodule Bench.Goto do
   @doc "Start, goal and the length of the shortest way (metres) of a draw."
   @spec draw(Setup.t(), atom(), integer()) ::
           {:ok, {Pose.t(), Pose.point(), float()}} | {:error, String.t()}
-  def draw(%{map: map, plan: plan}, kind, seed) do
-    radius = Setup.profile(kind).radius
+  def draw(%{map: map, plan: plan} = setup, kind, seed) do
+    radius = setup.options.bodies[kind].radius
     state = :rand.seed_s(:exsss, {seed, :erlang.phash2(map.name), 1})
     pair(map, plan, radius, state, @tries)
   end
@@ -120,7 +120,7 @@ defmodule Bench.Goto do
   defp step(_diagonal, plan), do: plan.cell * :math.sqrt(2)
 
   defp drive(setup, kind, {x, y} = goal, way_m, seed) do
-    way_s = way_m / Setup.profile(kind).max_linear
+    way_s = way_m / setup.options.bodies[kind].max_linear
     limit_ms = round(1000 * (@more_s + @times * way_s))
     trial = setup |> Trial.begin() |> Trial.command(kind, {:goto, x, y, nil})
 

@@ -3,7 +3,6 @@ defmodule Bench.GotoTest do
   alias Bench.Goto
   alias Hal.Pose
   alias Nav.Reach
-  alias Lab.Trial.Setup
 
   test "a draw follows from map and seed; a way leads to its goal, and none is shorter than the straight line" do
     for {map, seed} <- [{"doorway", 3}, {"offices", 8}] do
@@ -13,7 +12,7 @@ defmodule Bench.GotoTest do
       assert {:ok, {from, goal, way_m}} = draw = Goto.draw(setup, kind, seed)
       assert Goto.draw(setup, kind, seed) == draw
 
-      radius = Setup.profile(kind).radius
+      radius = setup.options.bodies[kind].radius
       assert Reach.check(setup.plan, Pose.point(from), goal, radius) == :ok
       assert way_m >= Pose.distance(from, goal) - 0.3
     end

@@ -4,9 +4,9 @@ defmodule Player.Boards do
   Pure.
   """
   import Player.State
-  alias Hal.Profile
   alias Hal.RFlex.Driver
   alias Player.State
+  alias Robot.File.Bodies
 
   # Options that must not be guessed: they say where each sensor is, and a robot drives by its
   # sensors.
@@ -27,9 +27,9 @@ defmodule Player.Boards do
   end
 
   @doc "Makes boards and poses consistent, for a body of that kind."
-  @spec complete(State.t(), :magellan | :atrv_mini) :: State.t()
+  @spec complete(State.t(), body :: atom()) :: State.t()
   def complete(state, kind) do
-    body = apply(Profile, kind, [])
+    {:ok, body} = Bodies.fetch(kind)
     state |> banked(body) |> ringed(body) |> paced(body)
   end
 

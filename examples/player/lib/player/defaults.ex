@@ -6,13 +6,14 @@ defmodule Player.Defaults do
   import Player.State
   alias Hal.Profile
   alias Player.State
+  alias Robot.File.Bodies
 
   @echo_us 30_000
   # The same as in Robot.File.Warnings.
   @slow_s 5.0
 
   @doc "The kind of robot: the one asked for, or a guess from its sensors and shape."
-  @spec profile(State.t(), :magellan | :atrv_mini | nil) :: {:magellan | :atrv_mini, State.t()}
+  @spec profile(State.t(), body :: atom() | nil) :: {body :: atom(), State.t()}
   def profile(state, nil) do
     touches? = value(state, [:body, :irs]) != nil or (value(state, [:body, :bumpers]) || 0) > 0
 
@@ -32,16 +33,16 @@ defmodule Player.Defaults do
   def profile(state, profile), do: {profile, state}
 
   @doc "Keeps and completes what fits a body of that kind."
-  @spec complete(State.t(), :magellan | :atrv_mini) :: State.t()
+  @spec complete(State.t(), body :: atom()) :: State.t()
   def complete(state, kind) do
-    body = apply(Profile, kind, [])
+    {:ok, body} = Bodies.fetch(kind)
 
     state
     |> ported()
     |> timed()
-    |> bumped(kind)
+    |> bumped(body)
     |> placed()
-    |> touchless(kind)
+    |> touchless(body)
     |> circled(body)
     |> limited(body)
   end
@@ -94,14 +95,14 @@ defmodule Player.Defaults do
     end
   end
 
-  defp bumped(state, kind) do
+  defp bumped(state, body) do
     count = value(state, [:drive, :bumpers, :count])
 
     cond do
       count == nil or value(state, [:drive, :bumpers, :style]) != nil ->
         state
 
-      kind == :magellan and count == 16 ->
+      body.rflex == :magellan and count == 16 ->
         state
         |> assume(1, "bumpers", "no style is given; those of a Magellan Pro are bits")
         |> keep(1, "bumpers", [{[:drive, :bumpers, :style], :bit}])
@@ -128,13 +129,13 @@ defmodule Player.Defaults do
   end
 
   # An ATRV mini has no bumpers, a Magellan has 16, whether the file says so or not.
-  defp touchless(state, :atrv_mini) do
+  defp touchless(state, %{rflex: :atrv_mini}) do
     if value(state, [:body, :bumpers]),
       do: state,
       else: keep(state, 1, "bumpers", [{[:body, :bumpers], 0}])
   end
 
-  defp touchless(state, :magellan), do: state
+  defp touchless(state, _body), do: state
 
   # The circle around a body of another size.
   defp circled(state, body) do
@@ -142,7 +143,7 @@ defmodule Player.Defaults do
     width = value(state, [:body, :width]) || body.width
 
     across =
-      if body.name == :magellan,
+      if Profile.round?(body),
         do: max(length, width),
         else: :math.sqrt(length * length + width * width)
 

@@ -4,7 +4,7 @@ defmodule Player.Validate do
   against the schema of robot files and against its driver. Pure, except that it looks up drivers.
   """
   alias Hal.Options.Type
-  alias Robot.File.{Device, Schema}
+  alias Robot.File.{Body, Device}
 
   @least %{drive: [port: "/dev/null"], ptz: [port: "/dev/null"], camera: [source: "/dev/video0"]}
 
@@ -19,7 +19,7 @@ defmodule Player.Validate do
   end
 
   defp refused([:body | keys], value, _modules) do
-    check = Enum.reduce(keys, Schema.body(), fn key, {:keys, table} -> table[key] end)
+    check = Enum.reduce(keys, Body.type(), &key/2)
 
     case Type.read(check, plain(value)) do
       {:ok, _value} -> nil
@@ -35,6 +35,9 @@ defmodule Player.Validate do
   end
 
   defp refused(_path, _value, _modules), do: nil
+
+  defp key(key, {:keys, table}), do: table[key]
+  defp key(key, {:or, nil, type}), do: key(key, type)
 
   # The bounds of a time that is assembled later are not options; segments are checked with their
   # count.

@@ -87,6 +87,7 @@ defmodule Console.Page.State do
       y: robot.pose && round3(robot.pose.y),
       a: robot.pose && round3(robot.pose.heading),
       r: robot.radius,
+      box: Enum.map(robot[:corners] || [], &point/1),
       alive: robot.alive,
       state: shown(robot.state),
       slot: point(robot.slot),

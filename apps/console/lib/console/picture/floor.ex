@@ -175,7 +175,7 @@ defmodule Console.Picture.Floor do
     [crown, body(robot, at, scale, fill: colour, stroke: "#FFFFFF", stroke_width: 1.2)]
   end
 
-  # A disc to scale, with a stroke from its centre to its front.
+  # A disc or a box to scale, with a stroke from the middle between its wheels to its front.
   defp body(robot, at, scale, look) do
     {x, y} = at.(Pose.point(robot.pose))
     r = Colours.size(robot, scale)
@@ -183,7 +183,7 @@ defmodule Console.Picture.Floor do
     nose = if look[:fill] == "#FFFFFF", do: look[:stroke], else: "#FFFFFF"
 
     [
-      Svg.element(:circle, [cx: x, cy: y, r: r] ++ look),
+      outline(robot[:corners] || [], {x, y}, r, robot, look),
       Svg.element(:line,
         x1: x,
         y1: y,
@@ -194,6 +194,20 @@ defmodule Console.Picture.Floor do
         stroke_linecap: "round"
       )
     ]
+  end
+
+  defp outline([], {x, y}, r, _round, look),
+    do: Svg.element(:circle, [cx: x, cy: y, r: r] ++ look)
+
+  defp outline(corners, {x, y}, r, robot, look) do
+    scale = r / robot.radius
+    {c, s} = {:math.cos(robot.pose.heading), :math.sin(robot.pose.heading)}
+
+    places =
+      for {ahead, left} <- corners,
+          do: {x + scale * (ahead * c - left * s), y - scale * (ahead * s + left * c)}
+
+    Svg.element(:polygon, [points: Svg.points(places)] ++ look)
   end
 
   defp slots(ground, scene, colours, at, scale) do

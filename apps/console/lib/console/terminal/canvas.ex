@@ -6,7 +6,7 @@ defmodule Console.Terminal.Canvas do
   # the screen. Rows are lists of `{text, style}`; `Console.Terminal.Style` turns styles into
   # colours.
   alias Console.Picture.MapView
-  alias Hal.Pose
+  alias Hal.{Pose, RobotName}
 
   @arrows {"→", "↗", "↑", "↖", "←", "↙", "↓", "↘"}
 
@@ -151,12 +151,11 @@ defmodule Console.Terminal.Canvas do
     put(cells, floor, cell(floor, Pose.point(robot.pose)), {text, style(robot)})
   end
 
-  # Beside its robot if there is room; without the letters of its kind if there is only room for
-  # that.
+  # Beside its robot if there is room; its number alone if there is only room for that.
   defp put_name(cells, floor, robot) do
     {column, row} = cell(floor, Pose.point(robot.pose))
     name = Atom.to_string(robot.id)
-    short = String.slice(name, 3..-1//1)
+    short = number(name)
     style = name_style(robot)
 
     spots = [
@@ -171,6 +170,13 @@ defmodule Console.Terminal.Canvas do
     case Enum.find(spots, &free?(cells, floor, &1)) do
       nil -> cells
       {text, left, row} -> put_text(cells, floor, text, left, row, style)
+    end
+  end
+
+  defp number(name) do
+    case name |> String.replace_prefix(RobotName.kind(name), "") |> String.trim("_") do
+      "" -> name
+      number -> number
     end
   end
 

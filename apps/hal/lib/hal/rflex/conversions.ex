@@ -41,13 +41,13 @@ defmodule Hal.RFlex.Conversions do
   @range 1474.0
 
   @doc """
-  The published conversions of a model's wheels, to begin with.
+  The published conversions of the wheels of such a body (`rflex` of `Hal.Profile`), to begin with; none of any other.
 
-      iex> Hal.RFlex.Conversions.published(:magellan)
-      [distance: 31387.0, angle: 4654.2]
+      iex> for rflex <- [:magellan, nil], do: Hal.RFlex.Conversions.published(rflex)
+      [[distance: 31387.0, angle: 4654.2], []]
   """
-  @spec published(:magellan | :atrv_mini) :: [distance: float(), angle: float()]
-  def published(kind), do: Map.fetch!(@published, kind)
+  @spec published(:magellan | :atrv_mini | nil) :: [{:distance | :angle, float()}]
+  def published(rflex), do: Map.get(@published, rflex, [])
 
   @doc "The published conversion of the sonars, in units per metre."
   @spec range() :: float()

@@ -52,7 +52,7 @@ defmodule Hal.RFlex.OptionCheck do
   end
 
   defp conversions(%{conversions: conversions, profile: profile}) do
-    usual = Conversions.published(profile.name) ++ [range: Conversions.range()]
+    usual = Conversions.published(profile.rflex) ++ [range: Conversions.range()]
     words = [distance: "units a metre", angle: "units a radian", range: "units a metre of sonar"]
 
     for {key, usual} <- usual, value = Map.fetch!(conversions, key) do

@@ -181,10 +181,10 @@ defmodule Hal.RFlex.Options do
     irs = given[:ir_banks] || eights(length(profile.irs))
     count = Enum.sum(irs)
     # The pause after each ping that is published for a Magellan; an ATRV mini has none.
-    ping = if profile.name == :magellan, do: 1250, else: 0
+    ping = if profile.rflex == :magellan, do: 1250, else: 0
 
     order =
-      if profile.name == :magellan and count == 16,
+      if profile.rflex == :magellan and count == 16,
         do: Infrared.magellan_order(),
         else: Enum.to_list(0..(count - 1)//1)
 

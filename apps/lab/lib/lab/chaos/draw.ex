@@ -140,7 +140,8 @@ defmodule Lab.Chaos.Draw do
     whole = {-width / 2, -height / 2, width / 2, height / 2}
     {place, random} = place(random, plan, if(where == :room, do: plan.room, else: whole))
     # The fleet must still have room to start.
-    bodies = for id <- robots, do: {id, Setup.profile(id).radius}
+    {:ok, profiles} = Options.bodies(robots, [])
+    bodies = for id <- robots, do: {id, profiles[id].radius}
     fits? = match?({:ok, _starts}, Sim.Floorplan.starts(plan, bodies, world, place))
     {if(fits?, do: place, else: :default), random}
   end

@@ -9,7 +9,7 @@ defmodule Lab.Node.Fleet do
   """
   alias Lab.Node.Network
   alias Sim.World
-  alias Lab.Trial.Setup
+  alias Lab.Trial.Options
   alias Sim.World.Snapshot
   alias Hal.Pose
 
@@ -20,7 +20,7 @@ defmodule Lab.Node.Fleet do
 
   @typedoc """
   `starts` is where the robots stand first, `place` that of their network, `mission` what they do when they are told to
-  start. `world` are more options of `Sim.World.new!/1`, `nodes` those of `Vm.Fleet.new/1`, `hardware` the robots with real
+  start. `bodies` are those of `Lab.Trial.Options.bodies/2`, `world` more options of `Sim.World.new!/1`, `nodes` those of `Vm.Fleet.new/1`, `hardware` the robots with real
   drivers. `beside` gives the children beside a robot, or `:world`, by its name; `prepare` is called with each new
   VM; `carrier` are the arguments of a robot's distribution.
   """
@@ -29,6 +29,7 @@ defmodule Lab.Node.Fleet do
           required(:place) => Network.place(),
           required(:folder) => Path.t(),
           required(:mission) => Robot.Config.module_options(),
+          optional(:bodies) => keyword(atom() | Hal.Profile.t()),
           optional(:world) => keyword(),
           optional(:nodes) => keyword(),
           optional(:hardware) => [atom()],
@@ -45,8 +46,9 @@ defmodule Lab.Node.Fleet do
     {:ok, network} = Network.create(options.place, robots)
     {:ok, map} = Sim.Floorplan.open("hall", length(robots))
 
-    bodies =
-      for {id, pose} <- options.starts, do: %{id: id, profile: Setup.profile(id), pose: pose}
+    {:ok, profiles} = Options.bodies(robots, Map.get(options, :bodies, []))
+
+    bodies = for {id, pose} <- options.starts, do: %{id: id, profile: profiles[id], pose: pose}
 
     more = Map.get(options, :world, [])
 
@@ -125,7 +127,8 @@ defmodule Lab.Node.Fleet do
       vm: apply(Network, :vm, [network, id | carrier]),
       main: fn vm ->
         start = start(fleet, id, if(hardware?, do: :zero, else: :on))
-        robot = %{id: id, profile: Setup.profile(id), hardware?: hardware?, start: start}
+        profile = fleet.world.robots[id].profile
+        robot = %{id: id, profile: profile, hardware?: hardware?, start: start}
         swarm = [missions: missions, mesh: Network.mesh(network, id)]
         part = {Lab.Node.Robot, Map.put(part, :robot, robot)}
         main(fleet, vm, part, id, [swarm: swarm], apps: :permanent)

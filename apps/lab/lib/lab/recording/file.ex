@@ -5,10 +5,6 @@ defmodule Lab.Recording.File do
   """
   alias Lab.{Recording, Trial}
 
-  # Robots of a run have one of these names (`Lab.Trial.Options`).
-  @kinds ["mag", "min"]
-  @most 100
-
   @enforce_keys [:path, :setup, :reader, :whole?]
   defstruct @enforce_keys
 
@@ -82,10 +78,7 @@ defmodule Lab.Recording.File do
   defp named({:error, line}, path), do: {:error, "#{path} #{line}"}
   defp named(ok, _path), do: ok
 
-  @doc "Makes the atoms exist that a recording of our robots can contain: reading creates none."
+  @doc "Makes the atoms of missions exist that a recording of our robots can contain; it brings the names of robots along."
   @spec know() :: :ok
-  def know do
-    _names = for kind <- @kinds, number <- 1..@most, do: :"#{kind}#{number}"
-    Swarm.MissionRegistry.load(:lab)
-  end
+  def know, do: Swarm.MissionRegistry.load(:lab)
 end

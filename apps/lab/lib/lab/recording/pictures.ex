@@ -28,7 +28,7 @@ defmodule Lab.Recording.Pictures do
 
     for {id, place} <- Enum.with_index(trial.options.robots),
         due?(place, at_ms, rate),
-        id in living,
+        id in living and Sim.World.camera?(trial.world, id),
         do: {id, Mechanics.frame(trial, id)}
   end
 

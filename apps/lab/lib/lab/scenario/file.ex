@@ -52,6 +52,7 @@ defmodule Lab.Scenario.File do
 
     with {:ok, {_line, value} = tree} <- Reader.read(text, "scenario"),
          :ok <- keys(value),
+         :ok <- Names.know(tree),
          {:ok, values} <- Terms.check(tree, {:keys, table}),
          [] <- Terms.at(Scenario.problems(values), tree),
          scenario = Scenario.build(values),
@@ -97,7 +98,12 @@ defmodule Lab.Scenario.File do
 
   defp option(:robots, robots) do
     count = length(robots)
-    if count <= 100 and robots == Names.fleet(count), do: "#{count}", else: Text.option(robots)
+
+    cond do
+      count <= 100 and robots == Names.fleet(count) -> "#{count}"
+      robots -- Names.all() == [] -> Text.option(robots)
+      true -> Text.option(Enum.map(robots, &Atom.to_string/1))
+    end
   end
 
   defp option(_key, value), do: Text.option(value)

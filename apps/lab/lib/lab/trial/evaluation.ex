@@ -4,7 +4,7 @@ defmodule Lab.Trial.Evaluation do
   # the leader's true pose. Robots never see this. Pure.
   alias Hal.Pose
   alias Sim.{Scene, World}
-  alias Lab.Trial.{AgreementMetrics, Claims, RunLog, Setup, Progress}
+  alias Lab.Trial.{AgreementMetrics, Claims, RunLog, Progress}
 
   @typedoc "A run at one moment; `claims` are those of the living robots."
   @type run :: %{
@@ -31,7 +31,8 @@ defmodule Lab.Trial.Evaluation do
         %{
           id: id,
           pose: World.truth(run.world, id),
-          radius: Setup.profile(id).radius,
+          radius: run.options.bodies[id].radius,
+          corners: Hal.Profile.corners(run.options.bodies[id]),
           alive: claim != nil,
           state: account.state,
           slot: slot && Pose.point(slot),

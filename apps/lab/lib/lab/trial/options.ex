@@ -2,6 +2,8 @@ defmodule Lab.Trial.Options do
   @moduledoc "Checks the options of a run, with their defaults. Pure."
   alias Hal.Options
   alias Hal.Options.{Suggest, Type, Wording}
+  alias Hal.{Profile, RobotName}
+  alias Robot.File.Bodies
   alias Missions.Landmark
   alias Lab.Trial.{Cuts, Event}
   alias Swarm.MissionRegistry
@@ -20,11 +22,13 @@ defmodule Lab.Trial.Options do
       iex> {options.robots, options.formation, options.map}
       {[:mag1], {:wedge, 1.0}, "hall"}
       iex> {:error, line} = Lab.Trial.Options.check(nois: :off)
-      iex> line =~ ~r/^trial option nois is not known: allowed are robots, seed, .*; did you mean noise\\?$/
+      iex> line =~ ~r/^trial option nois is not known: allowed are robots, bodies, seed, .*; did you mean noise\\?$/
       true
       iex> Lab.Trial.Options.check(robots: 12)
-      {:error, "trial option robots: expected a list of different names that begin with mag or min, " <>
-        "[:mag1, :min1], got 12"}
+      {:error, "trial option robots: expected a list of different names, [:mag1, :burger1], got 12"}
+      iex> {:ok, options} = Lab.Trial.Options.check(robots: [:rex, :mag1], bodies: [rex: :kobuki])
+      iex> for {id, body} <- options.bodies, do: {id, body.name}
+      [mag1: :magellan, rex: :kobuki]
   """
   @spec check(keyword() | map()) :: {:ok, map()} | {:error, line :: String.t()}
   def check(asked) when is_map(asked), do: asked |> Map.to_list() |> check()
@@ -34,6 +38,8 @@ defmodule Lab.Trial.Options do
          options = Map.merge(Map.new(@mission), Map.new(options)),
          {:ok, options} <- named(options),
          [] <- problems(options),
+         {:ok, bodies} <- bodies(options.robots, options.bodies),
+         options = %{options | bodies: bodies},
          :ok <- hardware(options) do
       {:ok, options}
     else
@@ -49,9 +55,13 @@ defmodule Lab.Trial.Options do
   defp own do
     [
       robots: [
-        {:check, &robots?/1,
-         "a list of different names that begin with mag or min, [:mag1, :min1],"},
+        {:check, &robots?/1, "a list of different names, [:mag1, :burger1],"},
         default: [:mag1, :mag2, :mag3, :min1, :min2, :min3]
+      ],
+      bodies: [
+        {:check, &bodies?/1,
+         "[rover: :kobuki, mag3: :atrv_mini], bodies by what robots' names begin with,"},
+        default: []
       ],
       seed: [:integer, default: 1],
       map: [
@@ -114,6 +124,40 @@ defmodule Lab.Trial.Options do
       kills ++ Event.problems(options.script, robots)
   end
 
+  @doc """
+  The body of each robot. `given` names bodies for robots by what their names begin with: `rover: :kobuki` is that of `rover1`,
+  and of two that fit the longer counts. A robot that none fits has the body with whose name, long or short, its own begins
+  (`Robot.File.Bodies`). The error is one line.
+
+      iex> {:ok, bodies} = Lab.Trial.Options.bodies([:burger1, :burger2], burger2: :kobuki)
+      iex> for {id, body} <- bodies, do: {id, body.name}
+      [burger1: :turtlebot3_burger, burger2: :kobuki]
+  """
+  @spec bodies([atom()], [{atom() | String.t(), atom() | String.t() | Profile.t()}] | map()) ::
+          {:ok, %{atom() => Profile.t()}} | {:error, line :: String.t()}
+  def bodies(robots, given) do
+    given = for {key, body} <- given, do: {to_string(key), body}
+    usual = for name <- Bodies.names(), do: {name, name}
+
+    Enum.reduce_while(robots, {:ok, %{}}, fn id, {:ok, bodies} ->
+      with {_name, body} <- longest(given, id) || longest(usual, id) || {nil, id},
+           {:ok, body} <- body(body) do
+        {:cont, {:ok, Map.put(bodies, id, body)}}
+      else
+        {:error, [line | _more]} -> {:halt, {:error, "the body of robot #{id}: #{line}"}}
+      end
+    end)
+  end
+
+  defp longest(named, id) do
+    named
+    |> Enum.filter(fn {name, _body} -> String.starts_with?("#{id}", name) end)
+    |> Enum.max_by(fn {name, _body} -> byte_size(name) end, fn -> nil end)
+  end
+
+  defp body(%Profile{} = body), do: {:ok, body}
+  defp body(name), do: Bodies.fetch(name)
+
   @doc "Whether robots have the floor plan, if that is not said: those that make a map themselves do not."
   @spec plan(term()) :: :none | :known
   def plan(nil), do: :known
@@ -125,10 +169,18 @@ defmodule Lab.Trial.Options do
     end
   end
 
-  defp hardware(%{hardware: ids, robots: robots}) do
-    if ids == Enum.uniq(ids) and ids -- robots == [],
-      do: :ok,
-      else: refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
+  defp hardware(%{hardware: ids, robots: robots, bodies: bodies}) do
+    cond do
+      ids != Enum.uniq(ids) or ids -- robots != [] ->
+        refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
+
+      id = Enum.find(ids, &(bodies[&1].rflex == nil)) ->
+        {:error,
+         "#{id} cannot be hardware: only bodies with an rFLEX controller are emulated on serial lines, mag and min"}
+
+      true ->
+        :ok
+    end
   end
 
   defp refuse(key, value, allowed), do: Options.refuse("trial", [key], value, allowed)
@@ -152,6 +204,13 @@ defmodule Lab.Trial.Options do
 
   defp ids?(ids), do: Type.list?(ids) and Enum.all?(ids, &is_atom/1)
 
-  defp robot?(id) when is_atom(id), do: String.starts_with?(Atom.to_string(id), ["mag", "min"])
-  defp robot?(_other), do: false
+  defp robot?(id), do: is_atom(id) and RobotName.valid?(id)
+
+  # Resolved ones, too, so that checked options can be checked again.
+  defp bodies?(%{} = bodies) when not is_struct(bodies), do: bodies |> Map.to_list() |> bodies?()
+
+  defp bodies?(bodies),
+    do: Type.keys?(bodies) and Enum.all?(bodies, fn {_key, body} -> body?(body) end)
+
+  defp body?(body), do: RobotName.valid?(body) or is_struct(body, Profile)
 end

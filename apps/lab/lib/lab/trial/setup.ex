@@ -25,7 +25,7 @@ defmodule Lab.Trial.Setup do
         }
 
   @doc """
-  A setup. Options (a keyword list or a map; all have defaults): `robots` (ids that begin with `mag` or `min`), `seed`,
+  A setup. Options (a keyword list or a map; all have defaults): `robots` (ids), `bodies` (`Lab.Trial.Options.bodies/2`), `seed`,
   `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Lab.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Lab.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
@@ -59,7 +59,7 @@ defmodule Lab.Trial.Setup do
   end
 
   defp set_up(options) do
-    bodies = for id <- options.robots, do: {id, profile(id).radius}
+    bodies = for id <- options.robots, do: {id, options.bodies[id].radius}
     landmark = landmark(options.landmark)
     asked = for {_x, _y} = place <- [landmark], do: place
     moves = for {place, _at_s} <- options.moves, do: place
@@ -110,37 +110,25 @@ defmodule Lab.Trial.Setup do
     options.script
     |> Enum.with_index(1)
     |> Enum.find_value(:ok, fn {{_at_s, event}, n} ->
-      with {:error, _line} = error <- check_event(map, event, options.robots),
+      with {:error, _line} = error <- check_event(map, event, options.bodies),
            do: at(["script", "#{n}"], error),
            else: (_fine -> nil)
     end)
   end
 
-  defp check_event(map, {:move, place}, _robots), do: check_landmarks(map, [place])
+  defp check_event(map, {:move, place}, _bodies), do: check_landmarks(map, [place])
 
-  defp check_event(map, {:displace, who, {x, y, _deg}}, robots),
-    do: check_place(map, who, {x, y}, robots)
+  defp check_event(map, {:displace, who, {x, y, _deg}}, bodies),
+    do: check_place(map, who, {x, y}, bodies)
 
-  defp check_event(_map, _event, _robots), do: :ok
+  defp check_event(_map, _event, _bodies), do: :ok
 
-  defp check_place(map, who, {x, y} = place, robots) do
-    ids = if who == :leader, do: robots, else: [who]
-    radius = ids |> Enum.map(&profile(&1).radius) |> Enum.max()
+  defp check_place(map, who, {x, y} = place, bodies) do
+    ids = if who == :leader, do: Map.keys(bodies), else: [who]
+    radius = ids |> Enum.map(&bodies[&1].radius) |> Enum.max()
 
     unless Sim.Floorplan.free?(map, place, radius),
       do: {:error, "#{who} cannot be put at #{x},#{y} of map #{map.name}: there is a wall"}
-  end
-
-  @doc """
-  The profile of a robot from its name, as in the thesis: `mag1` is a Magellan Pro, `min1` an ATRV
-  mini.
-  """
-  @spec profile(atom()) :: Profile.t()
-  def profile(id) do
-    case Atom.to_string(id) do
-      "min" <> _number -> Profile.atrv_mini()
-      _mag -> Profile.magellan()
-    end
   end
 
   defp build(options, map, robots, landmark) do
@@ -156,14 +144,21 @@ defmodule Lab.Trial.Setup do
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)
             hardware? = id in options.hardware
-            %{id: id, profile: profile(id), pose: pose, odometry: odometry, infrared: hardware?}
+
+            %{
+              id: id,
+              profile: options.bodies[id],
+              pose: pose,
+              odometry: odometry,
+              infrared: hardware?
+            }
           end
       )
 
     robots =
       for {id, pose} <- robots do
         hardware? = id in options.hardware
-        %{id: id, profile: profile(id), start: common || pose, hardware?: hardware?}
+        %{id: id, profile: options.bodies[id], start: common || pose, hardware?: hardware?}
       end
 
     plan =

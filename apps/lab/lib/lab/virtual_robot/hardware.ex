@@ -1,7 +1,7 @@
 defmodule Lab.VirtualRobot.Hardware do
   @moduledoc """
-  Gives robots of a simulated fleet the drivers of real ones: each has a base and a camera, emulated on pseudo-terminals
-  whose links are in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in the world behind them.
+  Gives robots of a simulated fleet whose bodies have an rFLEX controller (`rflex` of `Hal.Profile`) the drivers of real
+  ones: each has a base and a camera, emulated on pseudo-terminals whose links are in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in the world behind them.
 
       supervisor (one_for_one: a device that crashes was, in effect, switched off and on)
       `-- Sim.Emulator   two for each such robot
@@ -42,7 +42,7 @@ defmodule Lab.VirtualRobot.Hardware do
 
   defp devices(%{id: id, profile: profile} = robot, world, folder) do
     body = [world: world, robot: id]
-    base = [kind: profile.name, sonar_max: profile.sonar_max, ir_max: profile.ir_max]
+    base = [kind: profile.rflex, sonar_max: profile.sonar_max, ir_max: profile.ir_max]
 
     [
       emulator(
@@ -73,7 +73,7 @@ defmodule Lab.VirtualRobot.Hardware do
     [
       drive:
         {Hal.RFlex.Driver,
-         [port: base_link(folder, robot), profile: profile] ++ base(profile.name)},
+         [port: base_link(folder, robot), profile: profile] ++ base(profile.rflex)},
       ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)},
       departure_file: Path.join(folder, "#{robot.id}.departed")
     ]

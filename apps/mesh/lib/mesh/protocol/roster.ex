@@ -8,6 +8,8 @@ defmodule Mesh.Protocol.Roster do
   # All nodes of a fleet share the host part of their names, which need not be a machine's name
   # (`mag1@lab`): where a node is, is told by its beacons.
 
+  alias Hal.RobotName
+
   @enforce_keys [:me, :host, :nodes, :robots]
   defstruct @enforce_keys ++ [guests: 0]
 
@@ -24,7 +26,6 @@ defmodule Mesh.Protocol.Roster do
   @most 1_000
   # Of names that are not configured.
   @most_guests 64
-  @name ~S"[a-z][a-z0-9_]{0,30}"
 
   @doc """
   The roster of a node, from the names of its fleet.
@@ -44,16 +45,18 @@ defmodule Mesh.Protocol.Roster do
     %__MODULE__{me: me, host: host, nodes: nodes, robots: MapSet.new(fleet)}
   end
 
-  @doc "The fleet unless told otherwise: `mag1` to `mag100` and `min1` to `min100`."
-  @spec fleet() :: [atom(), ...]
-  def fleet, do: for(kind <- ~w(mag min), n <- 1..100, do: :"#{kind}#{n}")
-
-  @doc "The type of a configured fleet, for a table of `Hal.Options`: a list of names."
+  @doc """
+  The type of a configured fleet, for a table of `Hal.Options`: a list of names, which are atoms, or text in a file and in
+  the environment. A configuration is this machine's own, so its text becomes atoms.
+  """
   @spec type() :: Hal.Options.Type.t()
-  def type, do: {:list, {:check, &__MODULE__.name?/1, "a robot's name such as :mag1"}, @most}
+  def type,
+    do:
+      {:list, {:check, &__MODULE__.name/1, ~s(a robot's name such as "mag1" or "rover_2")}, @most}
 
   @doc false
-  def name?(name), do: is_atom(name) and Regex.match?(~r/\A#{@name}\z/, "#{name}")
+  def name(text) when is_binary(text), do: with(:error <- RobotName.read(text), do: false)
+  def name(name), do: is_atom(name) and RobotName.valid?(name)
 
   @doc "The node of that name, if it is known."
   @spec node(t(), String.t()) :: {:ok, node()} | :error
@@ -70,7 +73,7 @@ defmodule Mesh.Protocol.Roster do
   @spec guest?(t(), String.t()) :: boolean()
   def guest?(%{guests: guests, host: host}, text) do
     case String.split(text, "@", parts: 2) do
-      [name, ^host] -> guests < @most_guests and Regex.match?(~r/\A#{@name}\z/, name)
+      [name, ^host] -> guests < @most_guests and RobotName.valid?(name)
       _other -> false
     end
   end

@@ -5,8 +5,8 @@ defmodule Missions.Landmark.Lookout do
   # nothing is left. Pure.
   #
   # Places are frontiers (`Nav.Frontiers`) of what has been looked at (`Missions.Landmark.Coverage`). Robots tell
-  # each other where they have turned and where they go, so that they go apart. A robot that knows nothing of walls has no
-  # lookout: it wanders. `Missions.Landmark.Lookout.Legs` chooses among the places.
+  # each other where they have turned and where they go, so that they go apart. A robot that knows nothing of walls, or has no camera, has
+  # no lookout: it wanders. `Missions.Landmark.Lookout.Legs` chooses among the places.
   alias Hal.Pose
   alias Missions.Landmark
   alias Missions.Landmark.Coverage
@@ -51,6 +51,9 @@ defmodule Missions.Landmark.Lookout do
   def turned(%{percept: %{pose: pose, grid: grid}, lookout: lookout} = mission)
       when pose == nil or (grid == nil and lookout == nil),
       do: %{mission | lookout: nil}
+
+  # Nothing counts as looked at that it has only turned about.
+  def turned(%{percept: %{profile: %{camera: nil}}} = mission), do: %{mission | lookout: nil}
 
   def turned(%{percept: %{pose: pose}} = mission) do
     lookout = mission.lookout || %Legs{coverage: %Coverage{}}
@@ -141,6 +144,9 @@ defmodule Missions.Landmark.Lookout do
 
   @doc "How much has been looked at, for people; `nil` for a robot without a lookout."
   @spec says(Landmark.State.t()) :: String.t() | nil
+  def says(%{percept: %{profile: %{camera: nil}}}),
+    do: "has no camera, and waits for one that sees the landmark"
+
   def says(%{lookout: nil}), do: nil
 
   def says(%{lookout: lookout, percept: percept} = mission) do

@@ -111,11 +111,14 @@ defmodule Mix.Tasks.Robot.CheckTest do
     bad = Path.join(folder, "bad.exs")
     File.write!(bad, "[id: :mag1, profile: :magelan,\n dirve: 1]")
     lines = refused(Check, [Path.join(@robots, "mag1.exs"), bad, "none.exs"])
-    {:keys, table} = Schema.table(%{fleet: Schema.fleet(), colours: nil, map: nil, tables: []})
+
+    {:keys, table} =
+      Schema.table(%{bodies: nil, bodiless?: true, colours: nil, map: nil, tables: []})
+
     keys = table |> Keyword.keys() |> Enum.join(", ")
 
     assert lines == [
-             "#{bad}:1: profile: expected :magellan or :atrv_mini, got :magelan; did you mean :magellan?",
+             "#{bad}:1: profile: no body is named magelan: there are burger, mag, min, waffle, magellan, atrv_mini, create2, kobuki, pioneer3, turtlebot3_burger, turtlebot3_waffle; did you mean magellan?",
              "#{bad}:1: drive: is missing: expected {driver, options}, such as {Hal.RFlex.Driver, […]}",
              "#{bad}:2: dirve: is not known: allowed are #{keys}; did you mean drive?",
              "none.exs: no such file or directory"

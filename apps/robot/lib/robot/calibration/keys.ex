@@ -11,13 +11,13 @@ defmodule Robot.Calibration.Keys do
   alias Robot.Calibration.Model
 
   @doc """
-  The published conversions of a kind, as a starting point.
+  The published conversions of a body with such an rFLEX controller (`rflex` of `Hal.Profile`), as a starting point.
 
       iex> Robot.Calibration.Keys.published(:magellan)
       [distance: 31387.0, angle: 4654.2]
   """
-  @spec published(:magellan | :atrv_mini) :: [distance: float(), angle: float()]
-  def published(kind), do: Conversions.published(kind)
+  @spec published(:magellan | :atrv_mini | nil) :: [{:distance | :angle, float()}]
+  def published(rflex), do: Conversions.published(rflex)
 
   @doc """
   The new conversions of a base that was calibrated with these. `found` lists what was measured;

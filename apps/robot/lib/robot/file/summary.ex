@@ -7,8 +7,6 @@ defmodule Robot.File.Summary do
 
   alias Robot.File.{Device, RecordOptions, Warnings}
 
-  @kinds %{magellan: "a Magellan Pro", atrv_mini: "an ATRV mini"}
-  @weights %{magellan: 20, atrv_mini: 40}
   @delay_s 0.3
   @wide 88
 
@@ -74,7 +72,7 @@ defmodule Robot.File.Summary do
     judgement = Device.judge(robot.drive, body)
 
     [
-      "#{robot.id}, #{@kinds[body.name]} of #{@weights[body.name]} kg: #{metres(body.length)} long, " <>
+      "#{robot.id}, #{about(body)}: #{metres(body.length)} long, " <>
         "#{metres(body.width)} wide, #{metres(body.radius)} to its farthest corner"
     ] ++
       rows(
@@ -100,6 +98,12 @@ defmodule Robot.File.Summary do
         replace: replaceable(robot)
       )
   end
+
+  defp about(%Profile{about: about, name: name, mass: mass}),
+    do: (about || "a #{name}") <> if(mass, do: " of #{kilograms(mass)} kg", else: "")
+
+  defp kilograms(mass) when mass >= 10, do: "#{round(mass)}"
+  defp kilograms(mass), do: :erlang.float_to_binary(mass * 1.0, decimals: 1)
 
   defp rows(rows) do
     for {_name, words} = row <- rows, words not in [nil, ""], line <- row(row), do: line
@@ -196,9 +200,19 @@ defmodule Robot.File.Summary do
   end
 
   defp senses(profile, judgement) do
-    "#{length(profile.sonars)} sonars (#{metres(profile.sonar_min)} to #{metres(profile.sonar_max)}), " <>
-      "#{length(profile.irs)} infrareds#{unread(profile, judgement)}, #{profile.bumpers} bumpers#{blind(profile)}"
+    "#{sonars(profile)}, #{length(profile.irs)} infrareds#{unread(profile, judgement)}, " <>
+      "#{bumpers(profile)}#{blind(profile)}"
   end
+
+  defp sonars(%Profile{sonars: []}), do: "no sonars"
+
+  defp sonars(%Profile{sonars: sonars, sonar_min: least, sonar_max: most}),
+    do: "#{length(sonars)} sonars (#{metres(least)} to #{metres(most)})"
+
+  defp bumpers(%Profile{bumpers: count, bumper_span: span}) when count > 0 and span < 6.28,
+    do: "#{count} bumpers round it, those within #{degrees(span)} ahead"
+
+  defp bumpers(%Profile{bumpers: count}), do: "#{count} bumpers"
 
   defp unread(%{irs: [_ | _]}, %{senses: senses}),
     do: if(:infrared in senses, do: "", else: " (not read: no ir_a, no ir_b)")

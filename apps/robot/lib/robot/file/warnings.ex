@@ -38,6 +38,7 @@ defmodule Robot.File.Warnings do
   @spec lines(Robot.File.t(), (Path.t() -> boolean()), (Path.t() -> atom())) :: [String.t()]
   def lines(%Robot.File{} = robot, there?, kind \\ fn _path -> :device end) do
     limits(robot) ++
+      unseeing(robot) ++
       narrow(robot) ++
       drive(robot) ++
       words(robot.drive) ++
@@ -65,6 +66,29 @@ defmodule Robot.File.Warnings do
         "limits.#{acceleration}: with #{value} #{unit} it takes #{round(seconds)} s to #{doing} " <>
           "at full speed; #{Map.fetch!(kind, acceleration)} is usual"
   end
+
+  defp unseeing(%{profile: body}) do
+    with line when line != nil <- blind(body),
+         do: ["#{line}; a fence, and limits: [max_linear: 0.2] or less, are usual"],
+         else: (nil -> [])
+  end
+
+  @doc """
+  What a body without sonars cannot do, on one line; `nil` for any other. Nothing slows it before what it does not see.
+
+      iex> {:ok, create2} = Robot.File.Bodies.fetch("create2")
+      iex> Enum.map([create2, %{create2 | bumpers: 0}, Hal.Profile.magellan()], &Robot.File.Warnings.blind/1)
+      ["create2 has no ranges: it stops by its bumpers only, once it touches",
+       "create2 has no ranges, and no bumpers: nothing stops it when it touches", nil]
+  """
+  @spec blind(Profile.t()) :: String.t() | nil
+  def blind(%Profile{sonars: [], bumpers: 0, name: name}),
+    do: "#{name} has no ranges, and no bumpers: nothing stops it when it touches"
+
+  def blind(%Profile{sonars: [], name: name}),
+    do: "#{name} has no ranges: it stops by its bumpers only, once it touches"
+
+  def blind(_ranges), do: nil
 
   # The grid may say less than the map shows, by a cell.
   defp narrow(%{map: nil}), do: []

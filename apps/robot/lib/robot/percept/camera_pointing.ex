@@ -14,7 +14,7 @@ defmodule Robot.Percept.CameraPointing do
 
   @doc """
   The pan (radians, left positive) for an object that is now in direction `bearing` from the body,
-  limited to the camera's pan range.
+  limited to the camera's pan range; 0 of a body without a camera.
 
       iex> percept = %Robot.Percept{robot: :mag1, at_ms: 0, profile: Hal.Profile.magellan(),
       ...>   odometry: %Hal.Odometry{pose: Hal.Pose.new(0, 0), twist: Hal.Twist.new(0.0, 0.5)}}
@@ -25,13 +25,18 @@ defmodule Robot.Percept.CameraPointing do
   """
   @spec pan(bearing :: float(), Percept.t()) :: float()
   def pan(bearing, %Percept{profile: profile} = percept) do
-    limit = profile.camera.max_pan
+    limit = reach(profile)
     (bearing - @ahead_s * turn(percept)) |> max(-limit) |> min(limit)
   end
 
   @doc "Whether this direction from the body is within the camera's pan range."
   @spec within?(bearing :: float(), Percept.t()) :: boolean()
-  def within?(bearing, %Percept{profile: profile}), do: abs(bearing) <= profile.camera.max_pan
+  def within?(bearing, %Percept{profile: profile}), do: abs(bearing) <= reach(profile)
+
+  @doc "How far the camera can be panned to either side (radians); 0 of a body without one."
+  @spec reach(Hal.Profile.t()) :: float()
+  def reach(%{camera: nil}), do: 0.0
+  def reach(%{camera: camera}), do: camera.max_pan
 
   defp turn(%Percept{odometry: %Odometry{twist: twist}}), do: twist.turn
   defp turn(_percept), do: 0.0

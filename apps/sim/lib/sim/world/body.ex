@@ -24,8 +24,6 @@ defmodule Sim.World.Body do
   @latch_ms 200
   # An infrared's beam is a few degrees wide.
   @ir_cone :math.pi() / 45
-  # Cosine of half a bumper segment, 11.25 degrees.
-  @half_segment 0.9807852804032304
 
   @wheels %{distance: 1.0, base: 1.0, ratio: 1.0}
 
@@ -68,7 +66,7 @@ defmodule Sim.World.Body do
           look: {float(), float()},
           pan: float(),
           tilt: float(),
-          field_of_view: float(),
+          field_of_view: float() | nil,
           sonar: [float()],
           infrared: binary(),
           ir: [float()],
@@ -91,7 +89,7 @@ defmodule Sim.World.Body do
       odometry: Map.get(robot, :odometry, Pose.new(0, 0)),
       gains: gains(seed, index, noise),
       wheels: Map.merge(@wheels, Map.new(Map.get(robot, :wheels, []))),
-      field_of_view: profile.camera.field_of_view * 1.0,
+      field_of_view: profile.camera && profile.camera.field_of_view * 1.0,
       geometry: geometry(profile.sonars, profile.sonar_cone),
       infrared: if(robot[:infrared], do: geometry(profile.irs, @ir_cone), else: <<>>)
     }
@@ -225,6 +223,8 @@ defmodule Sim.World.Body do
 
   @doc "Turns the camera for `dt_ms`, as fast as the unit can."
   @spec slew(t(), pos_integer()) :: t()
+  def slew(%__MODULE__{profile: %Profile{camera: nil}} = body, _dt_ms), do: body
+
   def slew(%__MODULE__{profile: %Profile{camera: camera}, look: {pan, tilt}} = body, dt_ms) do
     s = dt_ms / 1000
 
@@ -242,7 +242,12 @@ defmodule Sim.World.Body do
   @spec press(t(), [Pose.point()], integer()) :: t()
   def press(%__MODULE__{pressed: pressed} = body, [], _at_ms) when pressed == %{}, do: body
 
-  def press(%__MODULE__{profile: %Profile{bumpers: count}} = body, points, at_ms) do
+  def press(%__MODULE__{profile: %Profile{bumpers: 0}} = body, _points, _at_ms), do: body
+
+  def press(%__MODULE__{profile: %Profile{bumpers: count} = profile} = body, points, at_ms) do
+    # Cosine of half a segment; the segments that the body has.
+    {half, _sine} = Trig.cos_sin(:math.pi() / count)
+    segments = Enum.filter(0..(count - 1), &segment?(&1, profile))
     held = for {k, until} <- body.pressed, until > at_ms, into: %{}, do: {k, until}
 
     now =
@@ -250,28 +255,38 @@ defmodule Sim.World.Body do
           {dx, dy} = {x - body.pose.x, y - body.pose.y},
           distance = :math.sqrt(dx * dx + dy * dy),
           distance > 0.0,
-          k <- 0..(count - 1)//1,
-          {c, s} = Trig.cos_sin(body.pose.heading + k * :math.pi() / 8),
-          dx * c + dy * s >= (@half_segment - 1.0e-9) * distance,
+          k <- segments,
+          {c, s} = Trig.cos_sin(body.pose.heading + 2 * k * :math.pi() / count),
+          dx * c + dy * s >= (half - 1.0e-9) * distance,
           into: held,
           do: {k, at_ms + @latch_ms}
 
     %{body | pressed: now}
   end
 
-  @doc "What the robot's devices report now."
+  defp segment?(k, %Profile{bumpers: count, bumper_span: span}),
+    do: abs(Pose.wrap(2 * k * :math.pi() / count)) <= span / 2 + 1.0e-9
+
+  @doc "What the robot's devices report now; a body without sonars, or without a camera, reports none of them."
   @spec readings(t(), integer()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
   def readings(%__MODULE__{} = body, at_ms) do
-    [
+    all = [
       {:odometry, %Odometry{pose: body.odometry, twist: body.measured}},
       {:sonar, body.sonar},
       {:bumpers, body.pressed |> Map.keys() |> Enum.sort()},
       # Two lead-acid batteries that last for three hours.
       {:power, max(22.0, 25.6 - at_ms * 3.0e-7)},
-      {:ptz, %{pan: body.pan, tilt: body.tilt, field_of_view: body.field_of_view}}
-      | if(body.ir == [], do: [], else: [{:ir, body.ir}])
+      {:ptz, %{pan: body.pan, tilt: body.tilt, field_of_view: body.field_of_view}},
+      {:ir, body.ir}
     ]
+
+    Enum.filter(all, fn {sense, _reading} -> has?(body, sense) end)
   end
+
+  defp has?(%{geometry: geometry}, :sonar), do: geometry != <<>>
+  defp has?(%{field_of_view: angle}, :ptz), do: angle != nil
+  defp has?(%{ir: ranges}, :ir), do: ranges != []
+  defp has?(_body, _sense), do: true
 
   defp towards(from, to, most) when to > from + most, do: from + most
   defp towards(from, to, most) when to < from - most, do: from - most

@@ -6,7 +6,7 @@ defmodule Swarm.Discovery.RobotInfo do
 
   | field | value |
   |---|---|
-  | `profile` | `:magellan`, `:atrv_mini` |
+  | `profile` | the name of its body, such as `:magellan` |
   | `battery` | volts, `nil` if it is not measured |
   | `calibrated` | `true` unless `say/2` says otherwise |
   | `mission`, `state` | what it is doing, such as `:landmark` and `:follow`, or `nil` and `:idle` |

@@ -11,7 +11,6 @@ defmodule Bench.Goto.Place do
   alias Robot.Percept
   alias Lab.Trial
   alias Sim.{Floorplan, World}
-  alias Lab.Trial.Setup
   alias Swarm.Member
 
   @way_m 50.0
@@ -114,7 +113,7 @@ defmodule Bench.Goto.Place do
     {[a, b, turn], draws} =
       Enum.map_reduce(1..3, draws, fn _, draws -> :rand.uniform_s(draws) end)
 
-    radius = Setup.profile(kind).radius
+    radius = setup.options.bodies[kind].radius
     {x, y} = at = candidate(how, map, truth, {a, b})
 
     if Floorplan.free?(map, at, radius + @beside) and

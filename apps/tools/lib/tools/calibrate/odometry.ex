@@ -34,7 +34,7 @@ defmodule Tools.Calibrate.Odometry do
   # Without conversions a base neither arms nor reports odometry; with those of another base it is
   # off by some percent.
   defp begin(%{drive: {driver, drive}} = file, conversions) when is_list(conversions) do
-    published = Keys.published(file.profile.name)
+    published = Keys.published(file.profile.rflex)
     missing = for {key, _value} <- published, conversions[key] == nil, do: key
 
     if missing != [],
@@ -152,7 +152,7 @@ defmodule Tools.Calibrate.Odometry do
         side: options.side
       }
 
-      profile = if file, do: file.profile, else: apply(Hal.Profile, options.profile, [])
+      profile = if file, do: file.profile, else: options.profile
       tell(measured, profile, conversions, options, nil)
     end
   end

@@ -3,6 +3,7 @@ defmodule Tools.Calibrate.Options do
   # Reads the command line of `mix calibrate odometry`: turns its arguments into a checked map or error
   # lines. Pure.
   alias Hal.Cli.Parse
+  alias Robot.File.Bodies
 
   @type t :: %{
           file: Path.t() | nil,
@@ -19,7 +20,7 @@ defmodule Tools.Calibrate.Options do
           ccw: [{float(), float()}],
           seed: integer(),
           seeds: pos_integer(),
-          profile: :magellan | :atrv_mini,
+          profile: Hal.Profile.t(),
           noise: :off | :default | :slip,
           wheels: keyword(float())
         }
@@ -48,8 +49,8 @@ defmodule Tools.Calibrate.Options do
       {"seed", "N", &Parse.whole(&1, 0..1_000_000), "of its noise (1)"},
       {"seeds", "N", &Parse.whole(&1, 1..1000),
        "this many robots, one after the other, and how exact the results are (1)"},
-      {"profile", "KIND", &Parse.choice(&1, magellan: :magellan, atrv_mini: :atrv_mini),
-       "magellan or atrv_mini (magellan)"},
+      {"profile", "BODY", &body/1,
+       "which body it has, such as magellan, atrv_mini, kobuki (magellan)"},
       {"noise", "KIND", &Parse.choice(&1, off: :off, default: :default, slip: :slip),
        "off, default or slip (default)"},
       {"true-distance", "FACTOR", &Parse.number(&1, 0.8, 1.25),
@@ -111,7 +112,7 @@ defmodule Tools.Calibrate.Options do
       ccw: all.("ccw"),
       seed: map["seed"] || 1,
       seeds: map["seeds"] || 1,
-      profile: map["profile"] || :magellan,
+      profile: map["profile"] || Hal.Profile.magellan(),
       noise: map["noise"] || :default,
       wheels: [
         distance: map["true-distance"] || 1.0,
@@ -119,6 +120,13 @@ defmodule Tools.Calibrate.Options do
         ratio: map["true-ratio"] || 1.01
       ]
     }
+  end
+
+  defp body(name) do
+    with {:error, _lines} <- Bodies.fetch(name) do
+      known = Bodies.names()
+      {:error, {Parse.either(known), Hal.Options.Suggest.hint(name, known)}}
+    end
   end
 
   defp mode(map) do

@@ -16,7 +16,8 @@ defmodule Mix.Tasks.Robot.Import do
   """
   use Mix.Task
   alias Hal.Options.Suggest
-  alias Robot.File.{Warnings, Schema}
+  alias Hal.RobotName
+  alias Robot.File.{Bodies, Warnings}
 
   @options [
     {"out", "OUT", &Hal.Cli.Parse.text/1,
@@ -24,7 +25,8 @@ defmodule Mix.Tasks.Robot.Import do
     {"force", nil, nil, "overwrites a file that exists"},
     {"name", "NAME", &Hal.Cli.Parse.text/1,
      "the robot's name; by default that of OUT, else mag1 or min1"},
-    {"profile", "KIND", &__MODULE__.profile/1, "magellan or atrv_mini; by default guessed"},
+    {"profile", "KIND", &__MODULE__.profile/1,
+     "its body, such as magellan, atrv_mini, pioneer3; by default guessed,\nmagellan or atrv_mini"},
     {"player", "N", &__MODULE__.version/1,
      "1 for Player 1.x (millimetres, degrees), 2 for later ones (metres);\nby default found out from the names of the options"}
   ]
@@ -96,10 +98,7 @@ defmodule Mix.Tasks.Robot.Import do
         {:ok, named}
 
       asked == nil ->
-        hint = Suggest.hint(options["name"], Enum.map(Enum.take(Schema.fleet(), 9), &to_string/1))
-
-        {:error,
-         "--name #{options["name"]} is not a robot: mag1 to mag100, min1 to min100#{hint}"}
+        {:error, "--name #{options["name"]}: expected #{RobotName.allowed()}"}
 
       named not in [nil, asked] ->
         {:error, "--name #{asked} does not match a file named #{named}.exs"}
@@ -109,11 +108,21 @@ defmodule Mix.Tasks.Robot.Import do
     end
   end
 
-  defp find(name), do: Enum.find(Schema.fleet(), &(Atom.to_string(&1) == name))
+  # Typed by a person, so it may become an atom.
+  defp find(name), do: with({:ok, id} <- RobotName.read(name), do: id, else: (:error -> nil))
 
   @doc false
   @spec profile(String.t()) :: {:ok, atom()} | {:error, Hal.Cli.Arguments.allowed()}
-  def profile(text), do: Hal.Cli.Parse.choice(text, magellan: :magellan, atrv_mini: :atrv_mini)
+  def profile(text) do
+    case Bodies.fetch(text) do
+      {:ok, body} ->
+        {:ok, body.name}
+
+      {:error, _lines} ->
+        known = Bodies.names()
+        {:error, {Hal.Cli.Parse.either(known), Suggest.hint(text, known)}}
+    end
+  end
 
   @doc false
   @spec version(String.t()) :: {:ok, 1 | 2} | {:error, String.t()}

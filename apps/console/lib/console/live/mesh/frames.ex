@@ -6,7 +6,6 @@ defmodule Console.Live.Mesh.Frames do
   # all others' in that of the start poses. Files that put two robots on one place cannot both be right: what is only known
   # by such a start is not known to others. Nor is the place of a robot that was started again on its way.
   alias Hal.Pose
-  alias Lab.Trial.Setup
   alias Swarm.Status
   alias Swarm.Status.Frame
 
@@ -67,18 +66,24 @@ defmodule Console.Live.Mesh.Frames do
 
   # The robots that start where another one does.
   defp twins(statuses) do
-    starts = for %{robot: id, frame: %Frame{start: start}} <- statuses, do: {id, start}
+    starts =
+      for %{robot: id, frame: %Frame{start: start}} = status <- statuses,
+          do: {id, start, shape(status).radius}
 
-    for {id, start} <- starts,
-        {other, _} <- [Enum.find(starts, &twin?(&1, id, start))],
+    for {id, start, radius} <- starts,
+        {other, _, _} <- [Enum.find(starts, &(elem(&1, 0) != id and twin?(&1, start, radius)))],
         into: %{},
         do: {id, other}
   end
 
-  defp twin?({id, _start}, id, _at), do: false
+  # A row does not say how large a robot is.
+  @unknown %{radius: 0.2, corners: []}
 
-  defp twin?({other, start}, id, at),
-    do: Pose.distance(at, start) < Setup.profile(id).radius + Setup.profile(other).radius
+  @doc "The shape of a robot, as far as it is known."
+  @spec shape(Status.t()) :: Status.body()
+  def shape(status), do: status.body || @unknown
+
+  defp twin?({_other, start, radius}, at, own), do: Pose.distance(at, start) < own + radius
 
   defp leads?(status), do: "#{status.state}" == "lead"
   defp index(statuses, [first | _]), do: Enum.find_index(statuses, &(&1.robot == first.robot))

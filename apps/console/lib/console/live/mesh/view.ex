@@ -7,7 +7,6 @@ defmodule Console.Live.Mesh.View do
   # are not drawn on one floor.
   alias Console.Live.Mesh.Frames
   alias Sim.Scene
-  alias Lab.Trial.Setup
   alias Swarm.Status
 
   # Older lines are forgotten.
@@ -75,7 +74,7 @@ defmodule Console.Live.Mesh.View do
 
   # Of a robot that does not answer, and has no row, only this is new.
   defp known(before, %Status{state: :no_answer}), do: %{before | state: :no_answer}
-  defp known(_before, now), do: now
+  defp known(before, now), do: %{now | body: now.body || before.body}
 
   defp tell({id, line}, view, clock, at_ms) do
     n = view.told + 1
@@ -157,10 +156,13 @@ defmodule Console.Live.Mesh.View do
   end
 
   defp robot(status, gone?, {frame, apart}) do
+    shape = Frames.shape(status)
+
     %{
       id: status.robot,
       pose: status.pose,
-      radius: Setup.profile(status.robot).radius,
+      radius: shape.radius,
+      corners: shape.corners,
       alive: not gone?,
       state: if(gone?, do: :not_heard, else: shown(status)),
       slot: nil,

@@ -7,6 +7,9 @@ defmodule Mesh.Distribution.Epmd.Peers do
   # `demo`
   # 9303. Other names share 9400 to 9999.
 
+  @usual %{"world" => 9_301, "base" => 9_302, "demo" => 9_303}
+  @numbered [{"mag", 9_100}, {"min", 9_200}]
+
   @type peer :: {node :: String.t(), :inet.ip_address(), :inet.port_number()}
 
   @doc """
@@ -26,12 +29,7 @@ defmodule Mesh.Distribution.Epmd.Peers do
 
   @doc "The port of a robot without a configured one."
   @spec default_port(String.t()) :: 9_101..9_999
-  def default_port("world"), do: 9_301
-  def default_port("base"), do: 9_302
-  def default_port("demo"), do: 9_303
-  def default_port("mag" <> number = name), do: numbered(number, 9_100) || shared(name)
-  def default_port("min" <> number = name), do: numbered(number, 9_200) || shared(name)
-  def default_port(name), do: shared(name)
+  def default_port(name), do: @usual[name] || numbered(name) || shared(name)
 
   @doc """
   The port that a node of this name listens on; 0 means any, for shells (`rem-…`, `rpc-…`), which
@@ -68,11 +66,14 @@ defmodule Mesh.Distribution.Epmd.Peers do
   # The names that Elixir's releases and shells give themselves.
   defp shell?(name), do: String.starts_with?(name, ["rem-", "rpc-", "undefined"])
 
-  defp numbered(text, base) do
-    case Integer.parse(text) do
-      {number, ""} when number in 1..100 -> base + number
-      _other -> nil
-    end
+  defp numbered(name) do
+    Enum.find_value(@numbered, fn {kind, base} ->
+      with true <- String.starts_with?(name, kind),
+           {number, ""} when number in 1..100 <-
+             name |> String.replace_prefix(kind, "") |> Integer.parse(),
+           do: base + number,
+           else: (_other -> nil)
+    end)
   end
 
   defp shared(name), do: 9_400 + rem(:erlang.crc32(name), 600)

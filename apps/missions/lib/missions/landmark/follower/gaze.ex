@@ -101,6 +101,8 @@ defmodule Missions.Landmark.Follower.Gaze do
   end
 
   # The robots ahead may fill the picture up to its border. Beyond it an unsure robot sees where the nearest of them ends.
+  defp aside(%{percept: %{profile: %{camera: nil}}}, _ahead, _turn), do: nil
+
   defp aside(
          %{follower: %{guide: guide, unsure?: unsure?}, percept: percept} = mission,
          ahead,

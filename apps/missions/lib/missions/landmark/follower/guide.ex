@@ -147,7 +147,7 @@ defmodule Missions.Landmark.Follower.Guide do
     back = :math.atan2(dy - slot.y, dx - slot.x)
     fore = :math.atan2(elem(ahead, 1) - slot.y, elem(ahead, 0) - slot.x)
     half = Pose.wrap(fore - back) / 2
-    pan = percept.profile.camera.max_pan
+    pan = CameraPointing.reach(percept.profile)
 
     cond do
       abs(Pose.wrap(back - slot.heading)) <= pan -> slot

@@ -5,7 +5,7 @@ defmodule Robot.Behaviour.Avoid.BackOut do
   # Something is so near to its corners that the gate lets it turn no more (`:corner`). After 2 s of that it drives straight
   # back the way that it came, which was free then, slowly, until its sonars show room to turn, or for
   # as far as it came straight. The gate limits that as all else.
-  alias Hal.{Odometry, Pose, Twist}
+  alias Hal.{Odometry, Pose, Profile, Twist}
   alias Robot.Percept
   alias Robot.Safety.Reflex.Body
 
@@ -42,10 +42,10 @@ defmodule Robot.Behaviour.Avoid.BackOut do
   @spec note(t(), Percept.t()) :: {float() | nil, t()}
   def note(state, %Percept{odometry: nil}), do: {nil, state}
 
-  def note(state, %Percept{profile: %{length: length, width: width}}) when length == width,
-    do: {nil, state}
+  def note(state, %Percept{profile: profile} = percept),
+    do: if(Profile.round?(profile), do: {nil, state}, else: boxed(state, percept))
 
-  def note(state, %Percept{odometry: %Odometry{frame: frame, pose: pose}} = percept) do
+  defp boxed(state, %Percept{odometry: %Odometry{frame: frame, pose: pose}} = percept) do
     state = if state.frame == frame, do: state, else: %__MODULE__{frame: frame}
     state = %{state | path: path(state.path, pose)}
     if state.out, do: drive(state, pose, percept), else: wait(state, pose, percept)

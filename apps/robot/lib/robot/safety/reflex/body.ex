@@ -133,14 +133,15 @@ defmodule Robot.Safety.Reflex.Body do
       true
   """
   @spec free_turn(Profile.t(), [point()], float()) :: float()
-  def free_turn(%Profile{length: length, width: width}, _points, _turn) when length == width,
-    do: 1.0e6
-
   def free_turn(_profile, _points, turn) when turn == 0, do: 1.0e6
 
-  def free_turn(%Profile{} = profile, points, turn) do
-    corner = :math.atan2(profile.width, profile.length)
-    corners = [corner, :math.pi() - corner, corner - :math.pi(), -corner]
+  def free_turn(%Profile{} = profile, points, turn),
+    do: free_turn(Profile.corners(profile), profile, points, turn)
+
+  defp free_turn([], _round, _points, _turn), do: 1.0e6
+
+  defp free_turn(corners, profile, points, turn) do
+    corners = for {x, y} <- corners, do: :math.atan2(y, x)
 
     free =
       for {x, y} <- points, x * x + y * y < profile.radius * profile.radius, reduce: 1.0e6 do
@@ -161,10 +162,10 @@ defmodule Robot.Safety.Reflex.Body do
       [0.2, 0.385]
   """
   @spec turning_room(Profile.t()) :: float()
-  def turning_room(%Profile{length: length, width: width, radius: radius}) when length == width,
-    do: radius
+  def turning_room(%Profile{} = profile),
+    do: if(Profile.round?(profile), do: profile.radius, else: sonar_room(profile))
 
-  def turning_room(%Profile{sonars: sonars, sonar_min: least, radius: radius}) do
+  defp sonar_room(%Profile{sonars: sonars, sonar_min: least, radius: radius}) do
     reach = least + @unmeasured
 
     for %{x: x, y: y, heading: heading} <- sonars do
@@ -188,8 +189,8 @@ defmodule Robot.Safety.Reflex.Body do
       0.1
   """
   @spec turn_at(Profile.t(), speed :: float()) :: float()
-  def turn_at(%Profile{length: length, width: width}, _speed) when length == width, do: 1.0e6
-  def turn_at(%Profile{radius: radius}, speed), do: speed / radius
+  def turn_at(%Profile{radius: radius} = profile, speed),
+    do: if(Profile.round?(profile), do: 1.0e6, else: speed / radius)
 
   # How far (radians) a corner may turn in this direction before it reaches the angle.
   defp swing(corner, angle, turn) do
