@@ -135,13 +135,21 @@ defmodule Robot.File.BodiesTest do
   test "a file of a body makes one atom, that of its own name", %{tmp_dir: folder} do
     name = "b#{System.unique_integer([:positive])}"
     File.write!(Path.join(folder, name <> ".exs"), @rover)
-    count = :erlang.system_info(:atom_count)
+    none? = &match?({:error, _}, existing(&1))
     assert {:error, _lines} = Bodies.fetch("no_" <> name, [folder])
     assert {:error, _lines} = Body.parse("[no_key_of_#{name}: :no_value_of_#{name}]", :b, "b.exs")
-    assert :erlang.system_info(:atom_count) == count
+
+    for text <- [name, "no_" <> name, "no_key_of_" <> name, "no_value_of_" <> name],
+        do: assert(none?.(text), text)
+
     assert {:ok, %{name: atom}} = Bodies.fetch(name, [folder])
-    assert Atom.to_string(atom) == name
-    assert :erlang.system_info(:atom_count) == count + 1
+    assert existing(name) == {:ok, atom}
+  end
+
+  defp existing(text) do
+    {:ok, String.to_existing_atom(text)}
+  rescue
+    ArgumentError -> {:error, :none}
   end
 
   test "names have one form, whatever they begin with", %{tmp_dir: folder} do
