@@ -49,7 +49,7 @@ defmodule Lab.CalibrationTest do
     test "5 squares in each direction find base and wheel ratio of the #{profile} for seeds #{inspect(seeds)}" do
       for seed <- unquote(Macro.escape(seeds)) do
         {truth, found, squares, _measured} =
-          run([seed: seed, wheels: @errors, profile: unquote(profile)], 5)
+          run([seed: seed, wheels: @errors, profile: apply(Hal.Profile, unquote(profile), [])], 5)
 
         assert off(found.base, truth.base) < 0.005
         assert off(found.ratio, truth.ratio) < 0.002

@@ -1,19 +1,20 @@
 defmodule Mix.Tasks.Calibrate do
-  @shortdoc "Measures a robot's wheels, or a colour that it looks for"
+  @shortdoc "Measures a robot's wheels, its ranges, or a colour that it looks for"
   @moduledoc """
-  Calibrates a robot's odometry and the colours that its camera looks for.
+  Calibrates a robot's odometry, its sonars and infrareds, and the colours that its camera looks for.
 
       mix calibrate odometry config/robots/NAME.exs [options]
+      mix calibrate ranges config/robots/NAME.exs [options]
       mix calibrate colour SOURCE --box X,Y,WIDTH,HEIGHT --name NAME [options]
 
-  `mix calibrate odometry --help` and `mix calibrate colour --help` list the options, with examples.
+  Each with `--help` lists its options, with examples.
 
   Exit status: 0 if all went well, 1 if the input or a measurement was wrong.
   """
   use Mix.Task
   alias Hal.Options.Suggest
 
-  @words ["odometry", "colour"]
+  @words ["odometry", "ranges", "colour"]
 
   @impl Mix.Task
   def run(arguments),
@@ -26,6 +27,9 @@ defmodule Mix.Tasks.Calibrate do
       ["odometry" | rest] ->
         odometry(rest)
 
+      ["ranges" | rest] ->
+        ranges(rest)
+
       [word | rest] when word in ["colour", "color"] ->
         colour(rest)
 
@@ -33,10 +37,12 @@ defmodule Mix.Tasks.Calibrate do
         IO.puts(@moduledoc)
 
       [word | _rest] ->
-        refuse("expected odometry or colour, got #{inspect(word)}#{Suggest.hint(word, @words)}")
+        refuse(
+          "expected odometry, ranges or colour, got #{inspect(word)}#{Suggest.hint(word, @words)}"
+        )
 
       [] ->
-        refuse("mix calibrate needs a command: mix calibrate odometry or mix calibrate colour")
+        refuse("mix calibrate needs a command: mix calibrate odometry, ranges or colour")
     end
   end
 
@@ -62,6 +68,7 @@ defmodule Mix.Tasks.Calibrate do
     Finds what is wrong with a robot's odometry: units per metre and radian, unequal wheels.
 
         mix calibrate odometry config/robots/NAME.exs [options]
+      mix calibrate ranges config/robots/NAME.exs [options]
         mix calibrate odometry --simulate [options]
 
     The robot drives straight on, turns, and drives squares both ways round (UMBmark, Borenstein and Feng
@@ -78,6 +85,30 @@ defmodule Mix.Tasks.Calibrate do
         mix calibrate odometry config/robots/mag1.exs --distance 5 --measured 5.12 --angle 360 --turned 351 --turned -349
         mix calibrate odometry config/robots/mag1.exs --side 4 --cw -0.31,-0.28 --cw -0.29,-0.30 --ccw 0.10,-0.05 --ccw 0.08,-0.07
         mix calibrate odometry --simulate --seeds 20 --true-base 1.02 --true-ratio 1.01
+    """
+  end
+
+  defp ranges(words) do
+    case Tools.Calibrate.Ranges.parse(words) do
+      {:ok, options} -> finish(Tools.Calibrate.Ranges.run(options))
+      {:error, lines} -> refuse(lines, "mix calibrate ranges --help lists all options")
+      :help -> IO.puts(ranges_help())
+    end
+  end
+
+  defp ranges_help do
+    """
+    Finds the conversions of a robot's sonars or infrareds by a flat wall at known distances. The wheels stay disarmed.
+
+        mix calibrate ranges config/robots/NAME.exs [options]
+
+    #{Hal.Cli.Arguments.help(Tools.Calibrate.Ranges.table())}
+
+    Examples:
+
+        mix calibrate ranges config/robots/mag1.exs --at 0.5,1,2
+        mix calibrate ranges config/robots/mag1.exs --sensor infrared --number 11
+        mix calibrate ranges config/robots/mag1.exs --at 0.5,1 --told 0.54,1.09 --write
     """
   end
 

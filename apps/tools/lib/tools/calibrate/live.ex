@@ -23,6 +23,59 @@ defmodule Tools.Calibrate.Live do
   @type driven :: %{told: Pose.t(), told_turn: float()}
 
   @doc """
+  Starts the robot of a file on this node, without camera and fence, calls a function with a prompt once it is ready, and ends it
+  again. A function that throws `{:quit, line}` ends with that error.
+  """
+  @spec with_robot(Robot.File.t(), (StdinPrompt.t() -> result)) :: result | {:error, String.t()}
+        when result: term()
+  def with_robot(file, fun) do
+    with {:ok, _apps} <- start_apps(),
+         # The robot is carried to its mark by hand, so it does not know where a fence is.
+         {:ok, config} <- Swarm.MemberSpec.config(%{file | camera: nil, ptz: nil, fence: nil}),
+         {:ok, _pid} <- start(config) do
+      talk = StdinPrompt.start()
+
+      try do
+        with :ok <- ready(file.id), do: fun.(talk)
+      catch
+        {:quit, line} -> {:error, line}
+      after
+        StdinPrompt.stop(talk)
+        Robot.Fleet.stop_robot(Robot.Fleet, file.id)
+      end
+    end
+  end
+
+  defp start_apps do
+    with {:error, {app, reason}} <- Application.ensure_all_started(:swarm),
+         do: {:error, "#{app} does not start: #{inspect(reason, limit: 5)}"}
+  end
+
+  defp start(config) do
+    with {:error, reason} <- Robot.Fleet.start_robot(Robot.Fleet, config),
+         do: {:error, "#{config.id} does not start: #{inspect(reason, limit: 5)}"}
+  end
+
+  @doc """
+  What these sensors of a robot tell in each of some looks, 0.2 s apart; fewer while they say nothing.
+  """
+  @spec ranges(atom(), :sonar | :ir, looks :: pos_integer()) :: [[float()]]
+  def ranges(robot, key, looks) do
+    for _look <- 1..looks, ranges = look(robot, key), do: ranges
+  end
+
+  defp look(robot, key) do
+    wait(fn ->
+      wait(fn ->
+        with {:ok, board} <- Board.find(robot),
+             {:ok, ranges, _at_ms} <- Board.fetch(board, key, @fresh_ms),
+             do: ranges,
+             else: (:error -> nil)
+      end)
+    end)
+  end
+
+  @doc """
   Waits until the robot's drive is online and ready. The error says what is missing.
   """
   @spec ready(atom(), non_neg_integer()) :: :ok | {:error, String.t()}

@@ -20,7 +20,7 @@ defmodule Tools.Calibrate.Odometry do
 
   def run(%{file: path} = options) do
     with {:ok, file, conversions} <- RobotFile.load(path) do
-      {file, conversions} = begin(file, conversions)
+      {file, conversions} = RobotFile.published(file, conversions)
       Enum.each(Plan.lines(options, file), &IO.puts/1)
 
       cond do
@@ -31,51 +31,11 @@ defmodule Tools.Calibrate.Odometry do
     end
   end
 
-  # Without conversions a base neither arms nor reports odometry; with those of another base it is
-  # off by some percent.
-  defp begin(%{drive: {driver, drive}} = file, conversions) when is_list(conversions) do
-    published = Keys.published(file.profile.rflex)
-    missing = for {key, _value} <- published, conversions[key] == nil, do: key
-
-    if missing != [],
-      do: IO.puts("#{Enum.join(missing, " and ")} not known yet: using the published ones")
-
-    conversions = Keyword.merge(published, Enum.reject(conversions, fn {_key, v} -> v == nil end))
-    drive = Keyword.put(drive, :conversions, conversions)
-    {%{file | drive: {driver, drive}, arm: :manual}, conversions}
-  end
-
-  defp begin(file, nil), do: {%{file | arm: :manual}, nil}
-
   defp live(options, file, conversions) do
-    with {:ok, _apps} <- start_apps(),
-         # The robot is carried to its mark by hand, so it does not know where a fence is.
-         {:ok, config} <- Swarm.MemberSpec.config(%{file | camera: nil, ptz: nil, fence: nil}),
-         {:ok, _pid} <- start(config) do
-      talk = StdinPrompt.start()
-
-      try do
-        with :ok <- Live.ready(file.id) do
-          driven = Enum.flat_map(Simulated.tasks(options), &course(&1, file, options, talk))
-          finish(driven, options, file, conversions, talk)
-        end
-      catch
-        {:quit, line} -> {:error, line}
-      after
-        StdinPrompt.stop(talk)
-        Robot.Fleet.stop_robot(Robot.Fleet, file.id)
-      end
-    end
-  end
-
-  defp start_apps do
-    with {:error, {app, reason}} <- Application.ensure_all_started(:swarm),
-         do: {:error, "#{app} does not start: #{inspect(reason, limit: 5)}"}
-  end
-
-  defp start(config) do
-    with {:error, reason} <- Robot.Fleet.start_robot(Robot.Fleet, config),
-         do: {:error, "#{config.id} does not start: #{inspect(reason, limit: 5)}"}
+    Live.with_robot(file, fn talk ->
+      driven = Enum.flat_map(Simulated.tasks(options), &course(&1, file, options, talk))
+      finish(driven, options, file, conversions, talk)
+    end)
   end
 
   # Repeats the course until it went well or is skipped.
@@ -161,7 +121,7 @@ defmodule Tools.Calibrate.Odometry do
 
   defp typed_file(path) do
     with {:ok, file, conversions} <- RobotFile.load(path) do
-      {file, conversions} = begin(file, conversions)
+      {file, conversions} = RobotFile.published(file, conversions)
       {:ok, file, conversions}
     end
   end

@@ -4,6 +4,7 @@ defmodule Tools.Calibrate.RobotFile do
   # but these numbers.
   alias Tools.Calibrate.StdinPrompt
   alias Console.Cli.{Diff, OutFile}
+  alias Robot.Calibration.Keys
   alias Swarm.MemberSpec
 
   @doc "Reads the file, and the conversions of its drive, `nil` for a drive that has none."
@@ -18,6 +19,25 @@ defmodule Tools.Calibrate.RobotFile do
 
   defp known?({driver, options}),
     do: driver == Hal.RFlex.Driver or is_list(options[:conversions])
+
+  @doc """
+  The robot, disarmed, with the published conversions of the wheels that its file lacks, and those conversions. Without any a base
+  neither arms nor reports odometry; with those of another base it is off by some percent.
+  """
+  @spec published(Robot.File.t(), keyword() | nil) :: {Robot.File.t(), keyword() | nil}
+  def published(file, nil), do: {%{file | arm: :manual}, nil}
+
+  def published(%{drive: {driver, drive}} = file, conversions) do
+    published = Keys.published(file.profile.rflex)
+    missing = for {key, _value} <- published, conversions[key] == nil, do: key
+
+    if missing != [],
+      do: IO.puts("#{Enum.join(missing, " and ")} not known yet: using the published ones")
+
+    conversions = Keyword.merge(published, Enum.reject(conversions, fn {_key, v} -> v == nil end))
+    drive = Keyword.put(drive, :conversions, conversions)
+    {%{file | drive: {driver, drive}, arm: :manual}, conversions}
+  end
 
   @doc """
   Shows the change, and writes it `:always`, `:never`, or if the person who is asked by `talk`
