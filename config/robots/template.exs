@@ -108,6 +108,9 @@
   # code that its release does not have (docs/missions.md). A restart returns to the release.
   # replace: false,
 
+  # Says aloud these stages of its mission, and "estop" and "reset", by Debian's espeak-ng; nil for nothing.
+  # say: [events: ["elected", "formed", "estop"], voice: "en"],
+
   # It moves only while a person's page, gamepad or bin/presence is heard, and so many seconds after the last word it stops and
   # is held, as by an emergency stop. 0.5 to 60; nil for never.
   # presence: 1.0,

@@ -30,6 +30,7 @@ defmodule Robot.Config do
       `Robot.Fence`, or `nil`
     * `:dry_run` - whether the robot only prints what it would do (`Robot.Safety.DryRun`), default
       `false`
+    * `:say` - what of the robot is said aloud (`Robot.Devices.Speech`), or `nil` (the default) for nothing
     * `:presence` - so many seconds after a person was last heard (`Robot.Safety.Gate.present/2`) the robot stops, and is held as by an
       emergency stop; `nil` (the default): it needs no person
     * `:replace` - whether its mission may be replaced while it runs (`Swarm.replace/2`), default `false`
@@ -69,6 +70,7 @@ defmodule Robot.Config do
                 fence: nil,
                 dry_run: false,
                 replace: false,
+                say: nil,
                 presence: nil,
                 estop_file: nil,
                 departure_file: nil,
@@ -100,6 +102,7 @@ defmodule Robot.Config do
           fence: Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
+          say: keyword() | nil,
           presence: float() | nil,
           estop_file: Path.t() | nil,
           departure_file: Path.t() | nil,
@@ -171,6 +174,7 @@ defmodule Robot.Config do
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       replace: {:one_of, [false, true]},
+      say: [{:keys, Robot.Devices.Speech.table()}, default: nil],
       presence: [presence(), default: nil],
       estop_file: [{:path, "the path of a file"}, default: nil],
       departure_file: [{:path, "the path of a file"}, default: nil],

@@ -6,6 +6,7 @@ defmodule Robot.Devices do
       |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
       |-- Vision.View          frames to pictures while there is a viewer (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
+      |-- Robot.Devices.Speech says aloud what becomes of the robot (only if told to)
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and what reflexes need
       |                        --> gate; whether the wheels may turn --> executive and pilot
       |-- Hal.Device :ptz      --> board, and where the camera looked --> blob detector
@@ -25,7 +26,7 @@ defmodule Robot.Devices do
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
 
-  @roles [:blob_detector, :view, :saver, :drive, :ptz, :camera]
+  @roles [:blob_detector, :view, :saver, :speech, :drive, :ptz, :camera]
   @patience_ms 5_000
 
   @doc "Starts the devices of a robot whose board is running."
@@ -46,6 +47,7 @@ defmodule Robot.Devices do
       blob_detector(config, write.(:blob_detector)) ++
         view(config, demand) ++
         saver(config) ++
+        speech(config) ++
         device(config, board, :drive, [
           write.(:drive),
           {Gate, :sense, [id]},
@@ -107,6 +109,9 @@ defmodule Robot.Devices do
     ours = [prefix: Atom.to_string(id), view: Names.via(id, :view), name: Names.via(id, :saver)]
     [{Vision.Saver, options ++ ours}]
   end
+
+  defp speech(%Robot.Config{say: nil}), do: []
+  defp speech(%Robot.Config{id: id, say: options}), do: [{Robot.Devices.Speech, {id, options}}]
 
   @doc false
   def disarmed?(board), do: match?({:ok, true, _at_ms}, Board.fetch(board, :disarmed, :infinity))

@@ -35,6 +35,7 @@ defmodule Robot.File do
                 fence: nil,
                 dry_run: false,
                 replace: false,
+                say: nil,
                 presence: nil,
                 estop_file: nil,
                 console: nil,
@@ -58,6 +59,7 @@ defmodule Robot.File do
           fence: Robot.Fence.t() | nil,
           dry_run: boolean(),
           replace: boolean(),
+          say: keyword() | nil,
           presence: float() | nil,
           estop_file: Path.t() | nil,
           console: keyword() | nil,
@@ -80,6 +82,7 @@ defmodule Robot.File do
     :fence,
     :dry_run,
     :replace,
+    :say,
     :presence,
     :estop_file
   ]

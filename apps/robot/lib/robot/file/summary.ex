@@ -92,6 +92,7 @@ defmodule Robot.File.Summary do
         stays: fence(robot.fence),
         "e-stop": estop(robot.estop_file),
         presence: presence(robot.presence),
+        says: says(robot.say),
         power: power(robot.console),
         network: network(robot.network),
         mission: mission(robot.policies),
@@ -260,6 +261,11 @@ defmodule Robot.File.Summary do
     [low, high] = for y <- [Enum.min(ys), Enum.max(ys)], do: metres(y)
     "within #{length(corners)} corners, x from #{left} to #{right}, y from #{low} to #{high}"
   end
+
+  defp says(nil), do: nil
+
+  defp says(options),
+    do: "#{Enum.join(options[:events], ", ")}, aloud, by #{options[:program] || "espeak-ng"}"
 
   defp presence(nil), do: nil
 
