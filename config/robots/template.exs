@@ -109,7 +109,7 @@
   # replace: false,
 
   # Says aloud these stages of its mission, and "estop" and "reset", by Debian's espeak-ng; nil for nothing.
-  # say: [events: ["elected", "formed", "estop"], voice: "en"],
+  # say: [events: ["elected", "formed", "estop"], program: "espeak-ng", voice: "en"],
 
   # It moves only while a person's page, gamepad or bin/presence is heard, and so many seconds after the last word it stops and
   # is held, as by an emergency stop. 0.5 to 60; nil for never.

@@ -174,7 +174,7 @@ defmodule Robot.Config do
       fence: [Fence.type(), default: nil],
       dry_run: :boolean,
       replace: {:one_of, [false, true]},
-      say: [{:keys, Robot.Devices.Speech.table()}, default: nil],
+      say: [{:keys, Robot.Config.Speech.table()}, default: nil],
       presence: [presence(), default: nil],
       estop_file: [{:path, "the path of a file"}, default: nil],
       departure_file: [{:path, "the path of a file"}, default: nil],

@@ -8,21 +8,12 @@ defmodule Robot.Devices.Speech do
   """
   use GenServer
   require Logger
-  alias Hal.{Event, Options}
+  alias Hal.Event
+  alias Robot.Config.Speech
   alias Robot.Names
 
   @longest_ms 10_000
   @events [[:robot, :stage], [:robot, :gate, :estop], [:robot, :gate, :reset]]
-
-  @table [
-    events: [{:list, {:text, "the name of a stage, such as \"formed\","}, 32}, required: true],
-    program: [{:path, "the name or path of a program"}, default: "espeak-ng"],
-    voice: [{:text, "a voice that the program has, such as \"en\","}, default: "en"]
-  ]
-
-  @doc "The table of the options of `say:`."
-  @spec table() :: Options.table()
-  def table, do: @table
 
   @doc "Starts it for a robot with these options."
   @spec start_link({robot :: atom(), keyword()}) :: GenServer.on_start()
@@ -49,7 +40,7 @@ defmodule Robot.Devices.Speech do
             Event.attach({__MODULE__, robot, event}, event, &__MODULE__.hear/4, {robot, self()})
 
     # Its file has checked them; the defaults are added here.
-    {:ok, options} = Options.check(options, @table, "say")
+    {:ok, options} = Speech.check(options)
     {:ok, %{robot: robot, options: Map.new(options), port: nil, waiting: nil, failed: nil}}
   end
 

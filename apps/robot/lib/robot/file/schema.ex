@@ -49,7 +49,7 @@ defmodule Robot.File.Schema do
      fence: {:or, nil, Fence.type()},
      dry_run: :boolean,
      replace: {:one_of, [false, true]},
-     say: {:or, nil, {:keys, Robot.Devices.Speech.table()}},
+     say: {:or, nil, {:keys, Robot.Config.Speech.table()}},
      presence: {:or, nil, Robot.Config.presence()},
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},

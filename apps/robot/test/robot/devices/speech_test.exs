@@ -7,6 +7,7 @@ defmodule Robot.Devices.SpeechTest do
   @moduletag :tmp_dir
 
   doctest Speech
+  doctest Robot.Config.Speech
 
   defp program(folder, script) do
     path = Path.join(folder, "say")
