@@ -29,7 +29,8 @@ defmodule Hal.DriveCase do
   | `:unplug` | a pulled cable is an error; once it is back the wheels stand until a person has acknowledged and armed |
   | `:restart` | a base that is switched off and on is found again, and odometry does not jump in one frame |
   """
-  alias Hal.{Device, Options, Pose, Twist}
+  alias Hal.{Device, Options, Twist}
+  import Hal.DriveCase.Run
 
   @doc "Starts a base at the other end of a line, whose link (`link:`) the kit adds to these options."
   @callback start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
@@ -67,23 +68,14 @@ defmodule Hal.DriveCase do
     max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
     sonar: [:boolean, default: false],
     wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    words: [{:integer, 1, 1_000_000_000, "words"}, default: 100_000],
+    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 60_000],
     seed: [:integer, default: 1]
   ]
 
-  # Slower than this the wheels stand, m/s and rad/s.
-  @stands 0.005
-  @turns 0.02
-  # Odometry that goes further than this from one report to the next has jumped, m.
-  @jump 0.5
-  @look_ms 10
-  @order_ms 50
-  @hold_ms 500
-
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `max_linear` and `max_turn` (what the driver's options
-  allow, 0.5 m/s and 1.0 rad/s), `sonar` (whether its base has any), `wait_ms` (how long a busy machine may take for what must come, 20,000), `words` (how
-  large the driver's state may be, 100,000), `seed` (of the noise). Raises `ArgumentError` for options that are wrong.
+  allow, 0.5 m/s and 1.0 rad/s), `sonar` (whether its base has any), `wait_ms` (how long a busy machine may take for what must come, 20,000), `bytes` (how
+  large the device's state may be, 60,000), `seed` (of the noise). Raises `ArgumentError` for options that are wrong.
   """
   @spec problems(driver :: {module(), keyword()}, base :: {module(), keyword()}, keyword()) ::
           [String.t()]
@@ -92,7 +84,7 @@ defmodule Hal.DriveCase do
     linear = min(options[:max_linear] / 2, 0.2)
     turn = min(options[:max_turn] / 2, 0.5)
 
-    case = %{
+    case = %Hal.DriveCase.Run{
       driver: driver,
       driver_options: driver_options,
       base: base,
@@ -101,25 +93,10 @@ defmodule Hal.DriveCase do
       speed: {linear, turn}
     }
 
-    for rule <- options[:only], {:error, line} <- [run(case, rule)], do: "#{rule}: #{line}"
+    for rule <- options[:only],
+        {:error, line} <- [within_folder(case, &rule(rule, &1))],
+        do: "#{rule}: #{line}"
   end
-
-  # The rules
-
-  defp run(case, rule) do
-    folder = Path.join(System.tmp_dir!(), "drive_case_#{System.pid()}_#{unique()}")
-    File.mkdir_p!(folder)
-    t = Map.merge(case, %{link: Path.join(folder, "line"), ref: make_ref(), order: nil})
-    t = Map.merge(t, %{device: nil, said: %{}, jumped?: false})
-
-    try do
-      rule(rule, t)
-    after
-      File.rm_rf!(folder)
-    end
-  end
-
-  defp unique, do: System.unique_integer([:positive])
 
   defp rule(:options, t) do
     case refusal(t, no_such_option: 1) do
@@ -139,12 +116,12 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:stands, t),
-    do: with_base(t, :auto, &hold(&1, "moves untold", fn t -> standing?(t) end))
+    do: on_base(t, :auto, &hold(&1, "moves untold", fn t -> standing?(t) end))
 
   defp rule(:drives, t) do
     {linear, turn} = t.speed
 
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- goes(t, Twist.new(linear, 0), "forwards", &(&1.linear > 0)),
            {:ok, t} <- goes(t, Twist.new(-linear, 0), "backwards", &(&1.linear < 0)),
            {:ok, t} <- goes(t, Twist.new(0, turn), "left", &(&1.turn > 0)),
@@ -160,7 +137,7 @@ defmodule Hal.DriveCase do
       abs(wheels.linear) <= 1.05 * linear + 0.02 and abs(wheels.turn) <= 1.05 * turn + 0.05
     end
 
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t),
            {:ok, t} <-
              hold(order(t, Twist.new(99, 0)), "drives faster than #{linear} m/s", within?),
@@ -173,19 +150,19 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:stop, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t), do: stands(order(t, Twist.zero()), "a stop")
     end)
   end
 
   defp rule(:silence, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t), do: stands(order(t, nil), "silence")
     end)
   end
 
   defp rule(:close, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t) do
         close(t.device)
         stands(order(t, nil), "the end of its device")
@@ -194,7 +171,7 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:killed, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t) do
         Process.exit(t.device, :kill)
         stands(order(t, nil), "the killing of its process")
@@ -203,7 +180,7 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:program, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t), [_ | _] = programs <- programs(t) do
         for program <- programs, do: {_out, 0} = System.cmd("kill", ["-KILL", "#{program}"])
 
@@ -218,32 +195,29 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:junk, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t),
            {:ok, t} <- noise(t, 40, :rand.seed_s(:exsss, t.options[:seed])),
            {:ok, t} <- alive(t, "noise on the line"),
            {:ok, t} <- online(t),
            {:ok, t} <- rolls(t),
-           size = :erts_debug.flat_size(:sys.get_state(t.device)),
-           do:
-             if(size > t.options[:words],
-               do: {:error, "its state has #{size} words after noise"},
-               else: {:ok, t}
-             )
+           do: small(t)
     end)
   end
 
   defp rule(:messages, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       for junk <- [:junk, {:junk, 1}, {make_ref(), {:data, "junk"}}, nil],
           do: send(t.device, junk)
 
-      with {:ok, t} <- rolls(t), do: alive(t, "messages that it does not know")
+      with {:ok, t} <- hold(t, "", fn _t -> true end),
+           {:ok, t} <- rolls(t),
+           do: alive(t, "messages that it does not know")
     end)
   end
 
   defp rule(:arming, t) do
-    with_base(t, :manual, fn t ->
+    on_base(t, :manual, fn t ->
       driven = order(t, forwards(t))
 
       with {:ok, t} <- hold(driven, "moves although it is not armed", &standing?/1),
@@ -256,7 +230,7 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:unplug, t) do
-    with_base(t, :manual, fn t ->
+    on_base(t, :manual, fn t ->
       with {:ok, t} <- armed(t),
            {:ok, t} <- rolls(t),
            :ok <- t.base.unplug(t.pid),
@@ -279,7 +253,7 @@ defmodule Hal.DriveCase do
   end
 
   defp rule(:restart, t) do
-    with_base(t, :auto, fn t ->
+    on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t),
            :ok <- t.base.restart(t.pid),
            {:ok, t} <- hold(t, "", fn _t -> true end),
@@ -292,60 +266,11 @@ defmodule Hal.DriveCase do
 
   # Steps of the rules: `{:ok, t}`, or `{:error, line}`.
 
-  defp with_base(t, arm, rule) do
-    case t.base.start_link([link: t.link] ++ t.base_options) do
-      {:ok, pid} ->
-        try do
-          with_device(Map.put(t, :pid, pid), arm, fn t ->
-            with {:ok, t} <- online(t), do: rule.(t)
-          end)
-        after
-          Process.unlink(pid)
-          GenServer.stop(pid)
-        end
-
-      {:error, line} ->
-        {:error, "its base does not start: #{inspect(line)}"}
-    end
+  defp on_base(t, arm, rule) do
+    with_base(t, arm, fn t ->
+      with {:ok, t} <- online(t), do: rule.(t)
+    end)
   end
-
-  defp with_device(t, arm, rule) do
-    driver = {t.driver, [port: t.link] ++ t.driver_options}
-    sinks = [{__MODULE__, :hear, [self(), t.ref]}]
-    options = [kind: :drive, driver: driver, sinks: sinks, arm: arm, sonar: t.options[:sonar]]
-    {:ok, device} = Device.start_link(options)
-    # A driver that crashes is a problem, not the end of the kit.
-    Process.unlink(device)
-
-    try do
-      rule.(%{t | device: device})
-    after
-      close(device)
-      flush(t.ref)
-    end
-  end
-
-  # As its supervisor does it; it may have ended before.
-  defp close(device) do
-    ref = Process.monitor(device)
-    Process.exit(device, :shutdown)
-    receive do: ({:DOWN, ^ref, :process, _pid, _reason} -> :ok)
-  end
-
-  @doc false
-  def hear(pid, ref, reading), do: send(pid, {ref, reading})
-
-  defp flush(ref) do
-    receive do
-      {^ref, _reading} -> flush(ref)
-    after
-      0 -> :ok
-    end
-  end
-
-  defp online(t), do: await(t, "does not come online", &(health(&1) == :online))
-
-  defp armed(t), do: await(t, "cannot be armed", fn t -> Device.arm(t.device) == :ok end)
 
   defp forwards(%{speed: {linear, _turn}}), do: Twist.new(linear, 0)
 
@@ -363,13 +288,9 @@ defmodule Hal.DriveCase do
          do: stands(order(t, Twist.zero()), "a stop on its way #{way}")
   end
 
-  defp measured(%{said: %{odometry: %{twist: twist}}}) do
-    # What rounding makes of a standing wheel is no direction.
-    linear = if abs(twist.linear) > 0.01, do: twist.linear, else: 0.0
-    %{linear: linear, turn: if(abs(twist.turn) > 0.02, do: twist.turn, else: 0.0)}
-  end
+  defp online(t), do: await(t, "does not come online", &(health(&1) == :online))
 
-  defp measured(_said_nothing), do: %{linear: 0.0, turn: 0.0}
+  defp armed(t), do: await(t, "cannot be armed", fn t -> Device.arm(t.device) == :ok end)
 
   defp alive(t, after_what) do
     if Process.alive?(t.device), do: {:ok, t}, else: {:error, "ends after #{after_what}"}
@@ -378,84 +299,13 @@ defmodule Hal.DriveCase do
   defp unjumped(%{jumped?: true}), do: {:error, "its odometry jumps within one frame"}
   defp unjumped(t), do: {:ok, t}
 
-  defp noise(t, 0, _rand), do: {:ok, t}
+  # Binaries count, too.
+  defp small(t) do
+    size = t.device |> :sys.get_state() |> :erlang.external_size()
 
-  defp noise(t, times, rand) do
-    {bytes, rand} = :rand.bytes_s(500, rand)
-    :ok = t.base.noise(t.pid, bytes)
-    noise(look(t, @order_ms), times - 1, rand)
-  end
-
-  defp order(t, twist), do: Map.merge(t, %{order: twist, ordered_ms: now() - @order_ms})
-
-  # Until it is so; the order is repeated, as a gate does.
-  defp await(t, line, condition), do: await(t, line, condition, now() + t.options[:wait_ms])
-
-  defp await(t, line, condition, until_ms) do
-    t = look(t, @look_ms)
-
-    cond do
-      condition.(t) -> {:ok, t}
-      now() >= until_ms -> {:error, line}
-      true -> await(t, line, condition, until_ms)
-    end
-  end
-
-  # For a while it must be so all the time.
-  defp hold(t, line, condition), do: hold(t, line, condition, now() + @hold_ms)
-
-  defp hold(t, line, condition, until_ms) do
-    t = look(t, @look_ms)
-
-    cond do
-      not condition.(t) -> {:error, line}
-      now() >= until_ms -> {:ok, t}
-      true -> hold(t, line, condition, until_ms)
-    end
-  end
-
-  # Takes what is said for so long.
-  defp look(%{order: %Twist{} = twist, ordered_ms: at_ms} = t, ms) do
-    if now() - at_ms >= @order_ms do
-      Device.drive(t.device, twist)
-      listen(%{t | ordered_ms: now()}, now() + ms)
-    else
-      listen(t, now() + ms)
-    end
-  end
-
-  defp look(t, ms), do: listen(t, now() + ms)
-
-  defp listen(%{ref: ref} = t, until_ms) do
-    receive do
-      {^ref, reading} -> t |> note(reading) |> listen(until_ms)
-    after
-      max(until_ms - now(), 0) -> t
-    end
-  end
-
-  defp note(t, {:odometry, odometry}) do
-    before = t.said[:odometry]
-
-    jumped? =
-      before != nil and before.frame == odometry.frame and
-        Pose.distance(before.pose, odometry.pose) > @jump
-
-    %{t | said: Map.put(t.said, :odometry, odometry), jumped?: t.jumped? or jumped?}
-  end
-
-  defp note(t, {:health, _device, {health, _since_ms}}),
-    do: %{t | said: Map.put(t.said, :health, health)}
-
-  defp note(t, _other), do: t
-
-  defp health(t), do: t.said[:health]
-
-  defp wheels(t), do: t.base.wheels(t.pid)
-
-  defp standing?(t) do
-    wheels = wheels(t)
-    abs(wheels.linear) < @stands and abs(wheels.turn) < @turns
+    if size > t.options[:bytes],
+      do: {:error, "its state has #{size} bytes after noise"},
+      else: {:ok, t}
   end
 
   # The programs of the device's ports.
@@ -465,8 +315,9 @@ defmodule Hal.DriveCase do
   end
 
   defp refusal(t, wrong) do
-    {:ok, state} = t.driver.init([port: t.link] ++ wrong ++ t.driver_options)
-    t.driver.terminate(state)
+    with {:ok, state} <- t.driver.init([port: t.link] ++ wrong ++ t.driver_options),
+         do: t.driver.terminate(state)
+
     :none
   rescue
     refused in ArgumentError -> {:ok, Exception.message(refused)}
@@ -483,6 +334,4 @@ defmodule Hal.DriveCase do
       do: {:error, "expected one line that names #{named}, got #{inspect(line)}"},
       else: :ok
   end
-
-  defp now, do: Hal.Clock.now_ms()
 end

@@ -2,7 +2,7 @@ defmodule Sim.Emulator.KobukiTest do
   @moduledoc "The emulated base by the examples and rules of the fact sheet, as bytes and time."
   use ExUnit.Case, async: true
   alias Hal.{Odometry, Pose, Twist}
-  alias Sim.Emulator.{Kobuki, Wheels}
+  alias Sim.Emulator.Kobuki
   doctest Sim.Emulator.Wheels
 
   @stop "AA5506010400000000" <> "03"
