@@ -53,7 +53,7 @@ defmodule Sim.DriveCaseTest do
           {:no_words, :killed, "does not stand after the killing of its process"},
           {:hoards, :junk, "its state has"},
           {:picky, :messages, "and has ended"},
-          {:blind, :unplug, "does not come online"},
+          {:blind, :unplug, "nobody has acknowledged"},
           {:forgets, :unplug, "odometry jumps"}
         ] do
       assert {^fault, [line]} = {fault, faults(fault, [rule])}

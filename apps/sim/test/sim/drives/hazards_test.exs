@@ -1,0 +1,46 @@
+defmodule Sim.HazardsTest do
+  @moduledoc "What a base senses of a danger stops its wheels, and disarms them until a person has looked."
+  use ExUnit.Case, async: true
+  import Hal.Lines, only: [eventually: 1]
+  alias Hal.{Device, Twist}
+  alias Sim.Emulator
+  @moduletag :realtime
+  @moduletag :tmp_dir
+
+  defp rolling(context, driver, core) do
+    link = Path.join(context.tmp_dir, "line")
+    emulator = start_supervised!({Emulator, core: core, link: link})
+    {driver, options} = driver
+    driver = {driver, [port: link] ++ options}
+    device = start_supervised!({Device, kind: :drive, driver: driver, arm: :manual})
+    eventually(fn -> Device.arm(device) == :ok end)
+    eventually(fn -> drive(device, emulator).linear > 0.05 end)
+    {emulator, device}
+  end
+
+  defp drive(device, emulator) do
+    Device.drive(device, Twist.new(0.1, 0.0))
+    Emulator.wheels(emulator)
+  end
+
+  # Though it is told to drive on; and when the danger is over, only a person makes it drive again.
+  defp stands({emulator, device}, change, back, words) do
+    :ok = Emulator.change(emulator, elem(change, 0), elem(change, 1))
+    eventually(fn -> drive(device, emulator) == Twist.zero() end)
+    assert Device.arming(device).state == :disarmed
+    {:error, line} = Device.arm(device)
+    assert line =~ words
+    :ok = Emulator.change(emulator, elem(back, 0), elem(back, 1))
+    eventually(fn -> Device.arming(device).why == nil end)
+    for _ <- 1..10, do: assert(drive(device, emulator) == Twist.zero())
+    eventually(fn -> Device.arm(device) == :ok end)
+    eventually(fn -> drive(device, emulator).linear > 0.05 end)
+  end
+
+  test "a Kobuki that is lifted, or at a stair", context do
+    rolling = rolling(context, {Hal.Kobuki.Driver, []}, {Emulator.Kobuki, []})
+
+    for {what, bits, words} <- [{:drops, 1, "hangs in the air (right)"}, {:cliffs, 6, "no floor"}],
+        do: stands(rolling, {:set, [what, bits]}, {:set, [what, 0]}, words)
+  end
+end
