@@ -8,8 +8,6 @@ defmodule Hal.Kobuki.Readings do
   @wheel_base 0.230
   # What a wheel can do, 0.7 m/s, and the most that turning adds.
   @max_wheel 1.1
-  # Two clocks that tell the time since the last packet, which differ by more: the base has restarted.
-  @clocks_ms 500
   @slip_turn 0.2
   @slip_ms 1_000
   @again_ms 1_000
@@ -65,7 +63,8 @@ defmodule Hal.Kobuki.Readings do
     senses = %{senses | drops: core.drops, cliffs: core.cliffs}
     turn = turned(senses)
     {odd, senses} = slip(senses, core, turn, at_ms)
-    {elapsed_ms, restarted?} = elapsed(senses.last, core.time, at_ms)
+    before = with {time, before_ms, _angle} <- senses.last, do: {time, before_ms}
+    {elapsed_ms, restarted?} = SerialBase.Odometry.elapsed(before, core.time, at_ms, 16)
 
     report = %{
       left: core.left,
@@ -81,14 +80,6 @@ defmodule Hal.Kobuki.Readings do
     {strained, senses} = strained(senses, core.overcurrent, at_ms)
     wheels = if odometry, do: [odometry: odometry], else: []
     {wheels ++ bumpers(senses, core) ++ [power: core.volts] ++ odd ++ strained, senses}
-  end
-
-  defp elapsed(nil, _time, _at_ms), do: {nil, false}
-
-  defp elapsed({before, before_ms, _angle}, time, at_ms) do
-    elapsed_ms = time - before &&& 0xFFFF
-    <<off::signed-16>> = <<elapsed_ms - (at_ms - before_ms)::16>>
-    {elapsed_ms, abs(off) > @clocks_ms}
   end
 
   # The gyro's turn since the last packet. The sheet does not say where its angle wraps, at a half turn or at 16 bits: between

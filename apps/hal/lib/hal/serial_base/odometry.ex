@@ -16,6 +16,7 @@ defmodule Hal.SerialBase.Odometry do
 
   @margin 1.5
   @held_up_ms 300
+  @clocks_ms 500
 
   @enforce_keys [:bits, :metres_per_tick, :wheel_base, :max_wheel, :frame]
   defstruct @enforce_keys ++
@@ -85,6 +86,25 @@ defmodule Hal.SerialBase.Odometry do
       t.suspect != nil and near?(t, t.suspect, seen) -> jump(t, seen)
       true -> {nil, %{t | suspect: seen, dropped: t.dropped + 1}}
     end
+  end
+
+  @doc """
+  How long it is since the last report by the base's own clock of so many bits, which counts milliseconds and wraps, and whether the base has
+  restarted: its clock and ours differ by more than half a second. `before` is `{its time, our time}` of the last report.
+
+      iex> Hal.SerialBase.Odometry.elapsed({65_530, 1_000}, 14, 1_020, 16)
+      {20, false}
+      iex> Hal.SerialBase.Odometry.elapsed({60_000, 1_000}, 100, 1_050, 32) |> elem(1)
+      true
+  """
+  @spec elapsed({integer(), integer()} | nil, integer(), integer(), 16 | 32) ::
+          {non_neg_integer() | nil, restarted? :: boolean()}
+  def elapsed(nil, _time, _at_ms, _bits), do: {nil, false}
+
+  def elapsed({before, before_ms}, time, at_ms, bits) do
+    <<elapsed_ms::size(bits)>> = <<time - before::size(bits)>>
+    <<off::signed-size(bits)>> = <<elapsed_ms - (at_ms - before_ms)::size(bits)>>
+    {elapsed_ms, abs(off) > @clocks_ms}
   end
 
   defp seen(%{left: left, right: right, at_ms: at_ms}), do: {left, right, at_ms}
