@@ -27,6 +27,12 @@ defmodule Bench.Bases do
         says: "Kobuki",
         driver: {Hal.Kobuki.Driver, []},
         core: {Sim.Emulator.Kobuki, []}
+      },
+      %{
+        name: :turtlebot3,
+        says: "TurtleBot3",
+        driver: {Hal.TurtleBot3.Driver, calibrate: false},
+        core: {Sim.Emulator.TurtleBot3, []}
       }
     ]
   end

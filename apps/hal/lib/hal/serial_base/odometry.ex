@@ -90,21 +90,24 @@ defmodule Hal.SerialBase.Odometry do
 
   @doc """
   How long it is since the last report by the base's own clock of so many bits, which counts milliseconds and wraps, and whether the base has
-  restarted: its clock and ours differ by more than half a second. `before` is `{its time, our time}` of the last report.
+  restarted: its clock went back, or differs from ours by more than half a second. `before` is `{its time, our time}` of the last report.
 
       iex> Hal.SerialBase.Odometry.elapsed({65_530, 1_000}, 14, 1_020, 16)
       {20, false}
-      iex> Hal.SerialBase.Odometry.elapsed({60_000, 1_000}, 100, 1_050, 32) |> elem(1)
-      true
+      iex> for time <- [900, 1_060, 1_700], do: elem(Hal.SerialBase.Odometry.elapsed({1_000, 0}, time, 50, 32), 1)
+      [true, false, true]
   """
   @spec elapsed({integer(), integer()} | nil, integer(), integer(), 16 | 32) ::
           {non_neg_integer() | nil, restarted? :: boolean()}
   def elapsed(nil, _time, _at_ms, _bits), do: {nil, false}
 
   def elapsed({before, before_ms}, time, at_ms, bits) do
+    gap_ms = at_ms - before_ms
     <<elapsed_ms::size(bits)>> = <<time - before::size(bits)>>
-    <<off::signed-size(bits)>> = <<elapsed_ms - (at_ms - before_ms)::size(bits)>>
-    {elapsed_ms, abs(off) > @clocks_ms}
+    <<signed_ms::signed-size(bits)>> = <<elapsed_ms::size(bits)>>
+    <<off_ms::signed-size(bits)>> = <<elapsed_ms - gap_ms::size(bits)>>
+    back? = signed_ms < 0 and gap_ms < 1 <<< (bits - 1)
+    {elapsed_ms, back? or abs(off_ms) > @clocks_ms}
   end
 
   defp seen(%{left: left, right: right, at_ms: at_ms}), do: {left, right, at_ms}

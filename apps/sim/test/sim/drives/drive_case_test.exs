@@ -31,6 +31,12 @@ defmodule Sim.DriveCaseTest do
     assert DriveCase.problems(driver, base, max_linear: 0.3, max_turn: 1.0) == []
   end
 
+  test "a TurtleBot3" do
+    driver = {Hal.TurtleBot3.Driver, calibrate: false}
+    base = emulated({Sim.Emulator.TurtleBot3, []})
+    assert DriveCase.problems(driver, base, max_linear: 0.22, max_turn: 2.84) == []
+  end
+
   # A driver with one fault, at a base that obeys at once and for ever.
   defp faults(fault, rules) do
     driver = {Sim.FaultyDrive, fault: fault}

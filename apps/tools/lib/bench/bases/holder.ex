@@ -17,6 +17,10 @@ defmodule Bench.Bases.Holder do
     :ok
   end
 
+  @doc "From now on arms no more: what a cause disarms stays so."
+  @spec arm_no_more() :: :ok
+  def arm_no_more, do: GenServer.call(__MODULE__, :arm_no_more)
+
   @doc "From now on orders this speed; `nil` for silence."
   @spec order(float() | nil) :: :ok
   def order(speed), do: GenServer.call(__MODULE__, {:order, speed})
@@ -29,10 +33,11 @@ defmodule Bench.Bases.Holder do
   def init({driver, speed}) do
     {:ok, device} = Device.start_link(kind: :drive, driver: driver, arm: :manual)
     {:ok, _timer} = :timer.send_interval(@order_ms, :drive)
-    {:ok, %{device: device, speed: speed, armed?: false}}
+    {:ok, %{device: device, speed: speed, arms?: true}}
   end
 
   @impl GenServer
+  def handle_call(:arm_no_more, _from, s), do: {:reply, :ok, %{s | arms?: false}}
   def handle_call({:order, speed}, _from, s), do: {:reply, :ok, drive(%{s | speed: speed})}
 
   def handle_call(:programs, _from, s) do
@@ -44,11 +49,15 @@ defmodule Bench.Bases.Holder do
   @impl GenServer
   def handle_info(:drive, s), do: {:noreply, drive(s)}
 
-  # Once, as a person does.
-  defp drive(%{armed?: false} = s), do: %{s | armed?: Device.arm(s.device) == :ok}
   defp drive(%{speed: nil} = s), do: s
 
   defp drive(s) do
+    # As a person does, until it drives.
+    if s.arms? do
+      _moved_or_not = Device.acknowledge(s.device)
+      _ready_or_not_yet = Device.arm(s.device)
+    end
+
     Device.drive(s.device, Twist.new(s.speed, 0.0))
     s
   end

@@ -27,6 +27,7 @@ defmodule Bench.Bases.Runner do
       true = within?(@start_ms, fn -> Emulator.wheels(emulator).linear > 0.95 * @speed end)
       # The times of causes and of the driver's ticks should not be those of its start.
       within?(:rand.uniform(100), fn -> false end)
+      :ok = Vm.call(vm, Holder, :arm_no_more, [])
       prepared = prepare(cause, vm)
       since_ms = Hal.Clock.now_ms()
       :ok = happen(cause, vm, emulator, prepared)
