@@ -15,7 +15,7 @@ defmodule Hal.SerialBase do
       while the base is not ready
     * the line's last words, said twice, by the port program: when the VM is killed or frozen, and when the driver ends
       (`Hal.Serial`)
-    * a base that says nothing that can be understood for 2 s is the error `:silent`
+    * a base that says nothing that can be understood for 2 s (`silent_ms:` of these) is the error `:silent`
     * what it keeps when a lost line is opened again in the same process, such as its odometry (`Hal.SerialBase.Odometry`)
   """
   alias Hal.{Options, Profile, Serial, Twist}
@@ -67,7 +67,17 @@ defmodule Hal.SerialBase do
 
   @optional_callbacks able_by: 1, farewell: 1
 
-  @enforce_keys [:driver, :options, :line, :ref, :ramp, :protocol, :heard_ms, :stepped_ms]
+  @enforce_keys [
+    :driver,
+    :options,
+    :line,
+    :ref,
+    :ramp,
+    :protocol,
+    :silent_ms,
+    :heard_ms,
+    :stepped_ms
+  ]
   defstruct @enforce_keys ++ [wanted: Twist.zero(), ordered_ms: nil, said: nil]
 
   @type t :: %__MODULE__{}
@@ -169,6 +179,7 @@ defmodule Hal.SerialBase do
         ref: make_ref(),
         ramp: options.limits,
         protocol: protocol,
+        silent_ms: Map.get(about, :silent_ms, @silent_ms),
         heard_ms: at_ms,
         stepped_ms: at_ms
       }
@@ -264,7 +275,7 @@ defmodule Hal.SerialBase do
   end
 
   defp alive(s, at_ms),
-    do: if(at_ms - s.heard_ms >= @silent_ms, do: {:error, :silent, s}, else: :ok)
+    do: if(at_ms - s.heard_ms >= s.silent_ms, do: {:error, :silent, s}, else: :ok)
 
   defp write(s, bytes) do
     case Serial.write(s.line, bytes) do

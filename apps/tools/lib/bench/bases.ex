@@ -33,6 +33,12 @@ defmodule Bench.Bases do
         says: "TurtleBot3",
         driver: {Hal.TurtleBot3.Driver, calibrate: false},
         core: {Sim.Emulator.TurtleBot3, []}
+      },
+      %{
+        name: :create,
+        says: "Create 2",
+        driver: {Hal.Create.Driver, []},
+        core: {Sim.Emulator.Create, []}
       }
     ]
   end

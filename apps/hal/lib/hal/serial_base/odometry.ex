@@ -64,6 +64,10 @@ defmodule Hal.SerialBase.Odometry do
     }
   end
 
+  @doc "The same place in a new frame, for counters that begin anew."
+  @spec anew(t()) :: t()
+  def anew(%__MODULE__{} = t), do: %{t | last: nil, suspect: nil, frame: make_ref()}
+
   @doc """
   Takes a report. The first one only sets the counters; `nil` is one that was dropped.
 

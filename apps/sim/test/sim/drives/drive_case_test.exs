@@ -37,6 +37,19 @@ defmodule Sim.DriveCaseTest do
     assert DriveCase.problems(driver, base, max_linear: 0.22, max_turn: 2.84) == []
   end
 
+  test "a Create 2" do
+    base = emulated({Sim.Emulator.Create, []})
+
+    assert DriveCase.problems({Hal.Create.Driver, []}, base, max_linear: 0.5, max_turn: 4.25) ==
+             []
+  end
+
+  test "an Arduino's base" do
+    driver = {Hal.Arduino.Driver, ticks: 1_440, wheel_radius: 0.033, wheel_base: 0.2}
+    base = emulated({Sim.Emulator.Arduino, []})
+    assert DriveCase.problems(driver, base, max_linear: 1.0, max_turn: 6.0) == []
+  end
+
   # A driver with one fault, at a base that obeys at once and for ever.
   defp faults(fault, rules) do
     driver = {Sim.FaultyDrive, fault: fault}

@@ -82,4 +82,17 @@ defmodule Sim.HazardsTest do
     assert %{disturbed?: false, still_ms: still_ms} = Emulator.core(emulator)
     assert System.monotonic_time(:millisecond) >= still_ms
   end
+
+  test "a Create 2 that is lifted, at a stair, on its charger, or with a wheel that is stuck",
+       context do
+    rolling = rolling(context, {Hal.Create.Driver, []}, {Emulator.Create, []})
+
+    for {what, bits, words} <- [
+          {:drops, 4, "hangs in the air (right)"},
+          {:cliffs, 6, "no floor under it (front left, front right)"},
+          {:charger, 1, "on its charger"},
+          {:overcurrent, 16, "draws too much current (left)"}
+        ],
+        do: stands(rolling, {:set, [what, bits]}, {:set, [what, 0]}, words)
+  end
 end
