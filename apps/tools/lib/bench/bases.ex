@@ -39,6 +39,12 @@ defmodule Bench.Bases do
         says: "Create 2",
         driver: {Hal.Create.Driver, []},
         core: {Sim.Emulator.Create, []}
+      },
+      %{
+        name: :arduino,
+        says: "Arduino",
+        driver: {Hal.Arduino.Driver, ticks: 1_440, wheel_radius: 0.033, wheel_base: 0.2},
+        core: {Sim.Emulator.Arduino, []}
       }
     ]
   end

@@ -20,7 +20,6 @@ defmodule Sim.Emulator.Arduino do
   @stop_ms 2_000
   @longest 32
   @period_ms 20
-  @repeat_ms 100
 
   @table [
     ticks: [{:integer, 1, 10_000_000}, default: 1_440],
@@ -32,7 +31,7 @@ defmodule Sim.Emulator.Arduino do
 
   @enforce_keys [:options, :wheels, :deaf_ms]
   defstruct @enforce_keys ++
-              [line: "", out: [], told_ms: nil, zero: {0.0, 0.0}, wished: nil, counts: %{bad: 0}]
+              [line: "", out: [], told_ms: nil, zero: {0.0, 0.0}, counts: %{bad: 0}]
 
   @type t :: %__MODULE__{}
 
@@ -120,15 +119,8 @@ defmodule Sim.Emulator.Arduino do
   @impl Sim.Emulator.Core
   def run(%__MODULE__{} = core, at_ms) do
     core = advance(core, at_ms)
-    wanted = Wheels.twist(core.wheels)
-
-    case core.wished do
-      {^wanted, since_ms} when at_ms - since_ms < @repeat_ms ->
-        {core.out, [], %{core | out: []}}
-
-      _other_or_long_ago ->
-        {core.out, [{:drive, wanted}], %{core | out: [], wished: {wanted, at_ms}}}
-    end
+    {wishes, wheels} = Wheels.wishes(core.wheels, at_ms)
+    {core.out, wishes, %{core | out: [], wheels: wheels}}
   end
 
   # The wheels stop at the firmware's own time, however late this is.

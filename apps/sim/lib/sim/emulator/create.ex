@@ -26,7 +26,6 @@ defmodule Sim.Emulator.Create do
   @stream_ms 15
   @sleep_ms 300_000
   @reset_ms 5_000
-  @repeat_ms 100
 
   @passive 1
   @safe 2
@@ -79,7 +78,6 @@ defmodule Sim.Emulator.Create do
                 cliffs: 0,
                 charger: 0,
                 overcurrent: 0,
-                wished: nil,
                 counts: %{commands: 0, unknown: 0, deaf: 0}
               ]
 
@@ -218,15 +216,8 @@ defmodule Sim.Emulator.Create do
   @impl Sim.Emulator.Core
   def run(%__MODULE__{} = core, at_ms) do
     core = core |> advance(at_ms) |> guard(at_ms) |> doze(at_ms) |> report(at_ms)
-    wanted = Wheels.twist(core.wheels)
-
-    case core.wished do
-      {^wanted, since_ms} when at_ms - since_ms < @repeat_ms ->
-        {core.out, [], %{core | out: []}}
-
-      _other_or_long_ago ->
-        {core.out, [{:drive, wanted}], %{core | out: [], wished: {wanted, at_ms}}}
-    end
+    {wishes, wheels} = Wheels.wishes(core.wheels, at_ms)
+    {core.out, wishes, %{core | out: [], wheels: wheels}}
   end
 
   defp advance(core, at_ms), do: %{core | wheels: Wheels.advance(core.wheels, at_ms)}

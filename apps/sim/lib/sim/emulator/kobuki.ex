@@ -25,7 +25,6 @@ defmodule Sim.Emulator.Kobuki do
   @metres_per_tick 8.5292090e-5
   # The longest that a command has, and more than that is noise.
   @longest 255
-  @repeat_ms 100
 
   @word {:integer, 0, 0xFFFF}
   @byte {:integer, 0, 255}
@@ -46,7 +45,6 @@ defmodule Sim.Emulator.Kobuki do
                 cliffs: 0,
                 overcurrent: 0,
                 asked: [],
-                wished: nil,
                 counts: %{packets: 0, bad: 0}
               ]
 
@@ -164,12 +162,8 @@ defmodule Sim.Emulator.Kobuki do
   end
 
   defp wish({bytes, core}, at_ms) do
-    wanted = Wheels.twist(core.wheels)
-
-    case core.wished do
-      {^wanted, since_ms} when at_ms - since_ms < @repeat_ms -> {bytes, [], core}
-      _other_or_long_ago -> {bytes, [{:drive, wanted}], %{core | wished: {wanted, at_ms}}}
-    end
+    {wishes, wheels} = Wheels.wishes(core.wheels, at_ms)
+    {bytes, wishes, %{core | wheels: wheels}}
   end
 
   defp payload(core, at_ms) do

@@ -22,7 +22,6 @@ defmodule Sim.Emulator.TurtleBot3 do
 
   @id 200
   @beat_ms 500
-  @repeat_ms 100
   @radius 0.033
   @ticks 4096
   @bases %{burger: 0.160, waffle: 0.287}
@@ -52,7 +51,6 @@ defmodule Sim.Emulator.TurtleBot3 do
                 torque?: false,
                 still_ms: nil,
                 disturbed?: false,
-                wished: nil,
                 counts: %{frames: 0, bad: 0, beats: 0}
               ]
 
@@ -216,15 +214,8 @@ defmodule Sim.Emulator.TurtleBot3 do
   @impl Sim.Emulator.Core
   def run(%__MODULE__{} = core, at_ms) do
     core = advance(core, at_ms)
-    wanted = Wheels.twist(core.wheels)
-
-    case core.wished do
-      {^wanted, since_ms} when at_ms - since_ms < @repeat_ms ->
-        {core.out, [], %{core | out: []}}
-
-      _other_or_long_ago ->
-        {core.out, [{:drive, wanted}], %{core | out: [], wished: {wanted, at_ms}}}
-    end
+    {wishes, wheels} = Wheels.wishes(core.wheels, at_ms)
+    {core.out, wishes, %{core | out: [], wheels: wheels}}
   end
 
   # The watchdog stops the wheels at its own time, however late this is.

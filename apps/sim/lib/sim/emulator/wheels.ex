@@ -8,6 +8,8 @@ defmodule Sim.Emulator.Wheels do
   """
   alias Hal.{Odometry, Pose, Twist}
 
+  @repeat_ms 100
+
   @enforce_keys [:base, :acceleration, :at_ms]
   defstruct @enforce_keys ++
               [
@@ -15,12 +17,13 @@ defmodule Sim.Emulator.Wheels do
                 speeds: {0.0, 0.0},
                 gone: {0.0, 0.0},
                 body: nil,
-                moved_ms: nil
+                moved_ms: nil,
+                wished: nil
               ]
 
   @typedoc """
   Pairs are of the left and the right wheel; `base` is the distance between them; `moved_ms` is when a wheel turned last, by what the
-  motors ask.
+  motors ask; `wished` is what the body was asked last.
   """
   @type t :: %__MODULE__{
           base: float(),
@@ -30,7 +33,8 @@ defmodule Sim.Emulator.Wheels do
           speeds: {float(), float()},
           gone: {float(), float()},
           body: Pose.t() | nil,
-          moved_ms: integer() | nil
+          moved_ms: integer() | nil,
+          wished: {Twist.t(), at_ms :: integer()} | nil
         }
 
   @doc "Wheels at rest."
@@ -117,6 +121,17 @@ defmodule Sim.Emulator.Wheels do
   @spec twist(t()) :: Twist.t()
   def twist(%__MODULE__{speeds: {left, right}, base: base}),
     do: Twist.new((left + right) / 2, (right - left) / base)
+
+  @doc "What the body should do now: that speed, where it has changed, and every 100 ms."
+  @spec wishes(t(), integer()) :: {[Sim.Emulator.Core.wish()], t()}
+  def wishes(%__MODULE__{} = wheels, at_ms) do
+    twist = twist(wheels)
+
+    case wheels.wished do
+      {^twist, since_ms} when at_ms - since_ms < @repeat_ms -> {[], wheels}
+      _other_or_long_ago -> {[{:drive, twist}], %{wheels | wished: {twist, at_ms}}}
+    end
+  end
 
   @doc "How far the robot has turned, by its wheels (radians, left positive)."
   @spec turned(t()) :: float()

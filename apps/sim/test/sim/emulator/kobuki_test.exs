@@ -109,7 +109,8 @@ defmodule Sim.Emulator.KobukiTest do
     core = base(counters: {0, 0}) |> hear(@ahead, 0) |> Kobuki.feel(odometry.(1.0, 0.0), 0)
     {_reports, core} = run(core, 400)
     core = core |> Kobuki.feel(odometry.(1.1, 0.0), 410)
-    {_bytes, _wishes, %{wished: {wanted, _at_ms}} = core} = Kobuki.run(core, 420)
+    {_bytes, _wishes, core} = Kobuki.run(core, 420)
+    {wanted, _at_ms} = core.wheels.wished
     assert wanted == Twist.new(0.1, 0)
     assert_in_delta elem(core.wheels.gone, 0), 0.1, 1.0e-9
   end
