@@ -118,6 +118,22 @@ defmodule Hal.SerialBase do
     end
   end
 
+  @doc """
+  Takes bytes of a protocol that keeps those of a message that has only begun as `rest`: `cut` splits them into messages and another
+  rest, `read` makes readings of one message.
+  """
+  @spec read(
+          protocol,
+          binary(),
+          (binary() -> {[message], rest :: binary()}),
+          (message, protocol -> {[Hal.Drive.reading()], protocol})
+        ) :: {[Hal.Drive.reading()], protocol}
+        when protocol: map(), message: term()
+  def read(protocol, bytes, cut, read) do
+    {messages, rest} = cut.(protocol.rest <> bytes)
+    Enum.flat_map_reduce(messages, %{protocol | rest: rest}, read)
+  end
+
   @doc false
   def table(driver, about) do
     body = [profile: [{:struct, Profile}, default: nil]]

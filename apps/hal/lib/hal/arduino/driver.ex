@@ -75,11 +75,8 @@ defmodule Hal.Arduino.Driver do
 
   @impl Hal.SerialBase
   def hear(protocol, bytes, at_ms) do
-    {answers, rest} = Arduino.cut(protocol.rest <> bytes)
-
-    {readings, protocol} =
-      Enum.flat_map_reduce(answers, %{protocol | rest: rest}, &answer(&2, &1, at_ms))
-
+    read = fn answer, protocol -> answer(protocol, answer, at_ms) end
+    {readings, protocol} = SerialBase.read(protocol, bytes, &Arduino.cut/1, read)
     {readings, [], protocol}
   end
 

@@ -32,7 +32,7 @@ defmodule Hal.Create.Driver do
       max_turn_acceleration: 3.0
     }
 
-  alias Hal.Create
+  alias Hal.{Create, SerialBase}
   alias Hal.Create.Readings
 
   @again_ms 500
@@ -53,12 +53,13 @@ defmodule Hal.Create.Driver do
 
   @impl Hal.SerialBase
   def hear(protocol, bytes, at_ms) do
-    {reports, rest} = Create.cut(protocol.rest <> bytes)
+    read = fn report, protocol ->
+      {readings, senses} = Readings.report(protocol.senses, report, at_ms)
+      {readings, %{protocol | senses: senses}}
+    end
 
-    {readings, senses} =
-      Enum.flat_map_reduce(reports, protocol.senses, &Readings.report(&2, &1, at_ms))
-
-    {readings, [], %{protocol | rest: rest, senses: senses}}
+    {readings, protocol} = SerialBase.read(protocol, bytes, &Create.cut/1, read)
+    {readings, [], protocol}
   end
 
   @impl Hal.SerialBase

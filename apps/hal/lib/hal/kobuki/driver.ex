@@ -30,7 +30,7 @@ defmodule Hal.Kobuki.Driver do
       max_turn_acceleration: 3.5
     }
 
-  alias Hal.{Kobuki, Twist}
+  alias Hal.{Kobuki, SerialBase, Twist}
   alias Hal.Kobuki.Readings
 
   @ask_ms 1_000
@@ -50,12 +50,13 @@ defmodule Hal.Kobuki.Driver do
 
   @impl Hal.SerialBase
   def hear(protocol, bytes, at_ms) do
-    {payloads, rest} = Kobuki.cut(protocol.rest <> bytes)
+    {readings, protocol} =
+      SerialBase.read(protocol, bytes, &Kobuki.cut/1, fn payload, protocol ->
+        {readings, senses} = Readings.packet(protocol.senses, payload, at_ms)
+        {readings, %{protocol | senses: senses}}
+      end)
 
-    {readings, senses} =
-      Enum.flat_map_reduce(payloads, protocol.senses, &Readings.packet(&2, &1, at_ms))
-
-    {readings, [], %{protocol | rest: rest, senses: senses}}
+    {readings, [], protocol}
   end
 
   @impl Hal.SerialBase

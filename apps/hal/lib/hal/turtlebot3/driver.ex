@@ -30,8 +30,8 @@ defmodule Hal.TurtleBot3.Driver do
       max_turn_acceleration: 3.0
     }
 
+  alias Hal.{SerialBase, Twist}
   alias Hal.TurtleBot3.{Packet, Readings}
-  alias Hal.Twist
 
   @wheel_bases %{burger: 0.160, waffle: 0.287}
   @reply_ms 20
@@ -77,12 +77,8 @@ defmodule Hal.TurtleBot3.Driver do
 
   @impl Hal.SerialBase
   def hear(protocol, bytes, at_ms) do
-    {replies, rest} = Packet.cut(protocol.rest <> bytes)
-
-    {readings, protocol} =
-      Enum.flat_map_reduce(replies, %{protocol | rest: rest}, &reply(&1, &2, at_ms))
-
-    protocol = if replies == [], do: protocol, else: answered(protocol, at_ms)
+    read = fn reply, protocol -> reply(reply, answered(protocol, at_ms), at_ms) end
+    {readings, protocol} = SerialBase.read(protocol, bytes, &Packet.cut/1, read)
     {said, protocol} = next(protocol, at_ms)
     {readings, said, protocol}
   end

@@ -12,8 +12,8 @@ defmodule Sim.Emulator.Arduino do
   **The wheels stop 2 s after the last command for them.** Commands end with a carriage return, answers with both characters; what it
   does not know is `Invalid Command`. Where the sheet leaves it open: of a line that is longer than 32 characters the rest is lost.
   """
-  @behaviour Sim.Emulator.Core
-  alias Hal.{Odometry, Options}
+  use Sim.Emulator.Wheels
+  alias Hal.Options
   alias Sim.Emulator.Wheels
 
   @loop_hz 30
@@ -43,18 +43,6 @@ defmodule Sim.Emulator.Arduino do
       {:ok, %__MODULE__{options: options, wheels: wheels, deaf_ms: at_ms + options.boot_ms}}
     end
   end
-
-  @impl Sim.Emulator.Core
-  def restart(%__MODULE__{} = core, at_ms) do
-    {:ok, new} = new(Map.to_list(core.options), at_ms)
-    %{new | wheels: %{new.wheels | body: core.wheels.body}}
-  end
-
-  @impl Sim.Emulator.Core
-  def feel(%__MODULE__{} = core, {:odometry, %Odometry{} = odometry}, _at_ms),
-    do: %{core | wheels: Wheels.feel(core.wheels, odometry)}
-
-  def feel(%__MODULE__{} = core, _other, _at_ms), do: core
 
   @impl Sim.Emulator.Core
   def hear(%__MODULE__{deaf_ms: deaf_ms} = core, _bytes, at_ms) when at_ms < deaf_ms, do: core

@@ -15,8 +15,8 @@ defmodule Sim.Emulator.Create do
   charger. After 5 minutes in the passive mode without a command it sleeps, and hears nothing until it is switched off and on. **It
   has no time-out.** Where the sheet leaves it open: an opcode that it does not know is passed over.
   """
-  @behaviour Sim.Emulator.Core
-  alias Hal.{Odometry, Options}
+  use Sim.Emulator.Wheels
+  alias Hal.Options
   alias Sim.Emulator.Create.Sensors
   alias Sim.Emulator.Wheels
 
@@ -96,8 +96,7 @@ defmodule Sim.Emulator.Create do
 
   @impl Sim.Emulator.Core
   def restart(%__MODULE__{} = core, at_ms) do
-    {:ok, new} = new(Map.to_list(core.options), at_ms)
-    boot = %{new | wheels: %{new.wheels | body: core.wheels.body}}
+    boot = super(core, at_ms)
     %{boot | out: ["bl-start\r\n2012-12-17\r\nRoomba by iRobot!\r\n"], cliffs: core.cliffs}
   end
 
@@ -106,12 +105,6 @@ defmodule Sim.Emulator.Create do
   def set(%__MODULE__{} = core, what, bits)
       when what in [:bumps, :drops, :cliffs, :charger, :overcurrent],
       do: Map.replace!(core, what, bits)
-
-  @impl Sim.Emulator.Core
-  def feel(%__MODULE__{} = core, {:odometry, %Odometry{} = odometry}, _at_ms),
-    do: %{core | wheels: Wheels.feel(core.wheels, odometry)}
-
-  def feel(%__MODULE__{} = core, _other, _at_ms), do: core
 
   @impl Sim.Emulator.Core
   def hear(%__MODULE__{} = core, bytes, at_ms),

@@ -15,8 +15,8 @@ defmodule Sim.Emulator.Kobuki do
   Where the sheet leaves it open: its angle wraps at 180 degrees, and a command's half is kept until the rest comes,
   and a command with a wrong sum is lost as a whole.
   """
-  @behaviour Sim.Emulator.Core
-  alias Hal.{Odometry, Options}
+  use Sim.Emulator.Wheels
+  alias Hal.Options
   alias Sim.Emulator.Wheels
   import Bitwise
 
@@ -63,12 +63,6 @@ defmodule Sim.Emulator.Kobuki do
          booted_ms: at_ms
        }}
     end
-  end
-
-  @impl Sim.Emulator.Core
-  def restart(%__MODULE__{} = core, at_ms) do
-    {:ok, new} = new(Map.to_list(core.options), at_ms)
-    %{new | wheels: %{new.wheels | body: core.wheels.body}}
   end
 
   @impl Sim.Emulator.Core
@@ -119,13 +113,10 @@ defmodule Sim.Emulator.Kobuki do
   defp speeds(speed, radius), do: {speed, speed * (radius + 115) / (radius - 115)}
 
   @impl Sim.Emulator.Core
-  def feel(%__MODULE__{} = core, {:odometry, %Odometry{} = odometry}, _at_ms),
-    do: %{core | wheels: Wheels.feel(core.wheels, odometry)}
-
   def feel(%__MODULE__{} = core, {:bumpers, pressed}, _at_ms),
     do: %{core | bumpers: pressed |> Enum.map(&switch/1) |> Enum.reduce(0, &bor/2)}
 
-  def feel(%__MODULE__{} = core, _other, _at_ms), do: core
+  def feel(%__MODULE__{} = core, other, at_ms), do: super(core, other, at_ms)
 
   # Sixteen places round a body, counter-clockwise from the front; behind there is no bumper.
   defp switch(place) when place in [15, 0, 1], do: 2

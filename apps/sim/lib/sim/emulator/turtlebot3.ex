@@ -15,8 +15,8 @@ defmodule Sim.Emulator.TurtleBot3 do
   **A heartbeat that has been missing for 500 ms zeroes the velocity**; what is written before the first one is zeroed, too. Without torque
   the wheels stand. Where the sheet leaves it open: an address that cannot be written is error 7, an unknown instruction error 2.
   """
-  @behaviour Sim.Emulator.Core
-  alias Hal.{Odometry, Options}
+  use Sim.Emulator.Wheels
+  alias Hal.Options
   alias Sim.Emulator.Wheels
   import Bitwise
 
@@ -63,18 +63,6 @@ defmodule Sim.Emulator.TurtleBot3 do
       {:ok, %__MODULE__{options: Map.new(options), wheels: wheels, booted_ms: at_ms}}
     end
   end
-
-  @impl Sim.Emulator.Core
-  def restart(%__MODULE__{} = core, at_ms) do
-    {:ok, new} = new(Map.to_list(core.options), at_ms)
-    %{new | wheels: %{new.wheels | body: core.wheels.body}}
-  end
-
-  @impl Sim.Emulator.Core
-  def feel(%__MODULE__{} = core, {:odometry, %Odometry{} = odometry}, _at_ms),
-    do: %{core | wheels: Wheels.feel(core.wheels, odometry)}
-
-  def feel(%__MODULE__{} = core, _other, _at_ms), do: core
 
   @impl Sim.Emulator.Core
   def hear(%__MODULE__{} = core, bytes, at_ms) do

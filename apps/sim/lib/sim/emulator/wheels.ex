@@ -5,6 +5,9 @@ defmodule Sim.Emulator.Wheels do
 
   With a body in a world, which reports its odometry (`feel/2`), the ways are the body's, and the speeds here are what the motors
   ask of it.
+
+  A `Sim.Emulator.Core` that says `use Sim.Emulator.Wheels`, and keeps them as `wheels` beside its checked `options`, feels where its body
+  goes, and is switched off and on as at the start, while the body stays where it is.
   """
   alias Hal.{Odometry, Pose, Twist}
 
@@ -36,6 +39,26 @@ defmodule Sim.Emulator.Wheels do
           moved_ms: integer() | nil,
           wished: {Twist.t(), at_ms :: integer()} | nil
         }
+
+  defmacro __using__(_no_options) do
+    quote do
+      @behaviour Sim.Emulator.Core
+
+      @impl Sim.Emulator.Core
+      def feel(core, {:odometry, odometry}, _at_ms),
+        do: %{core | wheels: Sim.Emulator.Wheels.feel(core.wheels, odometry)}
+
+      def feel(core, _other, _at_ms), do: core
+
+      @impl Sim.Emulator.Core
+      def restart(core, at_ms) do
+        {:ok, new} = new(Map.to_list(core.options), at_ms)
+        %{new | wheels: %{new.wheels | body: core.wheels.body}}
+      end
+
+      defoverridable feel: 3, restart: 2
+    end
+  end
 
   @doc "Wheels at rest."
   @spec new(base :: float(), acceleration :: float(), at_ms :: integer()) :: t()
