@@ -6,7 +6,7 @@ defmodule Sim.Emulator do
 
   | option | meaning |
   |---|---|
-  | `:core` | `{module, options}`, `Sim.Emulator.RFlexController` or `Sim.Emulator.ViscaCamera` |
+  | `:core` | `{module, options}`, a `Sim.Emulator.Core` such as `Sim.Emulator.RFlexController`, `Sim.Emulator.Kobuki` or `Sim.Emulator.ViscaCamera` |
   | `:link` | path of the symbolic link to the pseudo-terminal |
   | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` such as `Sim.Device.Drive`, or `nil` for none |
   | `:wire` | faults of the line in both directions, as in `Sim.Emulator.Wire` |
@@ -20,6 +20,7 @@ defmodule Sim.Emulator do
   with wheels that the body itself stops, until `thaw/1`; `restart/1` is its power switch.
   """
   use GenServer
+  @behaviour Hal.DriveCase
   alias Hal.{Event, Serial}
   alias Sim.Emulator.Wire
 
@@ -30,6 +31,7 @@ defmodule Sim.Emulator do
               [line: nil, body: nil, plugged?: true, frozen?: false, timer: nil, reason: nil]
 
   @doc "Starts the device; the error says in one line what is wrong with its options."
+  @impl Hal.DriveCase
   @spec start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
@@ -55,10 +57,12 @@ defmodule Sim.Emulator do
   end
 
   @doc "Removes the line."
+  @impl Hal.DriveCase
   @spec unplug(GenServer.server()) :: :ok
   def unplug(emulator), do: GenServer.call(emulator, :unplug)
 
   @doc "Restores the line, under the same link."
+  @impl Hal.DriveCase
   @spec plug(GenServer.server()) :: :ok
   def plug(emulator), do: GenServer.call(emulator, :plug)
 
@@ -71,6 +75,7 @@ defmodule Sim.Emulator do
   def thaw(emulator), do: GenServer.call(emulator, {:freeze, false})
 
   @doc "Switches the device off and on."
+  @impl Hal.DriveCase
   @spec restart(GenServer.server()) :: :ok
   def restart(emulator), do: GenServer.call(emulator, {:change, :restart, []})
 
@@ -86,6 +91,16 @@ defmodule Sim.Emulator do
   @spec spoil(GenServer.server(), keyword()) :: :ok | {:error, line :: String.t()}
   def spoil(emulator, options), do: GenServer.call(emulator, {:spoil, options})
 
+  @doc "The speed that the motors of a base give its wheels now."
+  @impl Hal.DriveCase
+  @spec wheels(GenServer.server()) :: Hal.Twist.t()
+  def wheels(emulator), do: GenServer.call(emulator, :wheels)
+
+  @doc "Puts bytes of noise on the line, as if the device had sent them."
+  @impl Hal.DriveCase
+  @spec noise(GenServer.server(), binary()) :: :ok
+  def noise(emulator, bytes), do: GenServer.call(emulator, {:noise, bytes})
+
   @doc "The current state of the device."
   @spec core(GenServer.server()) :: term()
   def core(emulator), do: GenServer.call(emulator, :core)
@@ -99,6 +114,14 @@ defmodule Sim.Emulator do
 
   @impl GenServer
   def handle_call(:core, _from, s), do: {:reply, s.core, s}
+
+  def handle_call(:wheels, _from, s),
+    do: {:reply, s.module.wheels(s.core, Hal.Clock.now_ms()), s}
+
+  def handle_call({:noise, bytes}, _from, s) do
+    if s.line, do: Serial.write(s.line, bytes)
+    {:reply, :ok, s}
+  end
 
   def handle_call(:unplug, _from, s) do
     s = close(%{s | plugged?: false})

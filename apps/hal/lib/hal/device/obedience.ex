@@ -66,8 +66,15 @@ defmodule Hal.Device.Obedience do
   def opened(%__MODULE__{refusals: refusals}),
     do: %__MODULE__{refusals: Map.new(refusals, fn {what, r} -> {what, %{r | row: 0}} end)}
 
-  @doc "Takes what the device was told: a direction (radians) of a head, or a speed of wheels."
+  @doc """
+  Takes what the device was told: a direction (radians) of a head, or a speed of wheels. A value that is not a speed counts as a
+  stop, as it does in the driver.
+  """
   @spec told(t(), {float(), float()} | Twist.t()) :: t()
+  def told(%__MODULE__{} = obedience, %Twist{linear: linear, turn: turn})
+      when not is_float(linear) or not is_float(turn),
+      do: %{obedience | wanted: Twist.zero()}
+
   def told(%__MODULE__{} = obedience, wanted), do: %{obedience | wanted: wanted}
 
   @doc """

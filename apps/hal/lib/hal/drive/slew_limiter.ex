@@ -1,6 +1,6 @@
 defmodule Hal.Drive.SlewLimiter do
   @moduledoc """
-  Limits every speed that a driver is given, and its change. Pure. In the driver that uses it (`Hal.RFlex.Driver`) it is the
+  Limits every speed that a driver is given, and its change. Pure. In the drivers that use it (`Hal.RFlex.Driver`, all of `Hal.SerialBase`) it is the
   last limit before the wire, after gate and arming; the gate's ramp (`Robot.Safety.Reflex`) is the same, `approach/4`.
 
   Each of the two speeds is kept within its limit, grows at most by its acceleration, and shrinks

@@ -1,8 +1,8 @@
 defmodule Hal.RFlex.Counters do
   @moduledoc false
   # Counts what went wrong on a driver's line since it was opened, and reports it.
-  alias Hal.Event
-  alias Hal.RFlex.{Driver, Options, Readings, Schedule}
+  alias Hal.{Event, SerialBase}
+  alias Hal.RFlex.{Driver, Readings, Schedule}
 
   @tell_ms 10_000
 
@@ -29,7 +29,7 @@ defmodule Hal.RFlex.Counters do
       if lost != s.told,
         do:
           Event.execute([:hal, :rflex, :lost], Map.put(counts, :at_ms, at_ms), %{
-            port: Options.line_name(s.options)
+            port: SerialBase.Options.line_name(s.options)
           })
 
       Schedule.again(%{s | told: lost}, :tell, at_ms, @tell_ms)

@@ -57,7 +57,7 @@ defmodule Hal.RFlex.Driver do
   have been switched off and on; one that sends no packet at all for 2 s is the error `:silent`.
   """
   @behaviour Hal.Drive
-  alias Hal.{Serial, Twist}
+  alias Hal.{Serial, SerialBase, Twist}
   alias Hal.RFlex.{Commands, Counters, Options, OptionCheck, Readings, Receiver, Schedule, Speeds}
   alias Hal.RFlex.Protocol.{Command, Decoder, Queue}
 
@@ -105,7 +105,7 @@ defmodule Hal.RFlex.Driver do
         {:error, line} -> raise ArgumentError, line
       end
 
-    serial = Options.line(options) ++ [last_words: Commands.last_words(options)]
+    serial = SerialBase.Options.line(options) ++ [last_words: Commands.last_words(options)]
     with {:ok, line} <- Serial.open(serial), do: {:ok, start(options, line)}
   end
 
@@ -149,11 +149,11 @@ defmodule Hal.RFlex.Driver do
   """
   @impl Hal.Drive
   def explain(:silent, options) do
-    "#{Options.line_name(options)}: the base does not report its wheels (is it on, its cable right, its speed " <>
+    "#{SerialBase.Options.line_name(options)}: the base does not report its wheels (is it on, its cable right, its speed " <>
       "#{options[:speed] || 115_200} baud?)"
   end
 
-  def explain(reason, options), do: Serial.explain(reason, Options.line_name(options))
+  def explain(reason, options), do: Serial.explain(reason, SerialBase.Options.line_name(options))
 
   @impl Hal.Drive
   def drive(twist, s) do
@@ -179,7 +179,11 @@ defmodule Hal.RFlex.Driver do
   @impl Hal.Drive
   def terminate(s) do
     # Kept for the device's next opening: odometry that starts again at zero would be a jump.
-    Process.put({__MODULE__, Options.line_name(s.options)}, {s.senses.odometry, s.senses.frame})
+    Process.put(
+      {__MODULE__, SerialBase.Options.line_name(s.options)},
+      {s.senses.odometry, s.senses.frame}
+    )
+
     Serial.last_words(s.line, Commands.farewell(s.options))
     Serial.close(s.line)
   end
@@ -201,7 +205,7 @@ defmodule Hal.RFlex.Driver do
     # A new process does not know of earlier movement: what it counts from now on is in a frame of
     # its own.
     {before, frame} =
-      Process.delete({__MODULE__, Options.line_name(options)}) || {nil, make_ref()}
+      Process.delete({__MODULE__, SerialBase.Options.line_name(options)}) || {nil, make_ref()}
 
     queue = Enum.reduce(Commands.first_words(options), Queue.new(options.pace_ms), &put/2)
     queue = Queue.stop(put({:brake, Command.brake()}, queue), Commands.stop(options))

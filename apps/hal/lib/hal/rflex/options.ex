@@ -2,8 +2,7 @@ defmodule Hal.RFlex.Options do
   @moduledoc false
   # Checks the options of `Hal.RFlex.Driver`, where they are listed: their table, and the defaults that follow from the
   # body. Pure.
-  alias Hal.{Options, Profile, Serial}
-  alias Hal.Drive.SlewLimiter
+  alias Hal.{Options, Profile, Serial, SerialBase}
   alias Hal.RFlex.Conversions
   alias Hal.RFlex.Sensors.Bumpers
   alias Hal.RFlex.Sensors.Infrared
@@ -24,37 +23,20 @@ defmodule Hal.RFlex.Options do
       default: nil
     ]
   ]
-  @limits [
-    max_linear: {:number, 1.0e-3, 10.0, "m/s"},
-    max_turn: {:number, 1.0e-3, 10.0, "rad/s"},
-    max_acceleration: {:number, 1.0e-3, 10.0, "m/s2"},
-    max_turn_acceleration: {:number, 1.0e-3, 10.0, "rad/s2"},
-    max_braking: {:number, 1.0e-3, 10.0, "m/s2"},
-    max_turn_braking: {:number, 1.0e-3, 10.0, "rad/s2"}
-  ]
   @bumpers [
     style: {:one_of, [:bit, :address]},
     base: {:integer, 0, 255},
     count: {:integer, 0, 64},
     segments: {:list, {:integer, 0, 15}}
   ]
-  # If the VM freezes, the wheels turn on for this long; the driver gives a sign of life every
-  # 50 ms.
-  @serial Serial.table()
-          |> Keyword.take([:pty, :module])
-          |> Keyword.put(:keep_alive_ms, {:integer, 100, 300, "ms"})
   @times {:tuple, [{:integer, 1, 1_000_000}, {:integer, 0, 1_000_000}, {:integer, 0, 1_000_000}],
           "{echo, ping, set}, whole microseconds up to 1000000,"}
-  @table [
-    port: [:path, default: nil],
-    speed: [{:integer, 1, 20_000_000, "baud"}, default: 115_200],
-    serial: [{:keys, @serial}, default: []],
+  @own [
     profile: [
       {:check, &__MODULE__.profile/1, ":magellan, :atrv_mini or a %Hal.Profile{}"},
       default: Profile.magellan()
     ],
     conversions: [{:keys, @conversions}, default: []],
-    limits: [{:keys, @limits}, default: []],
     bumpers: [{:keys, @bumpers}, default: []],
     sonar_banks: [{:list, {:integer, 0, 16}, 16}, default: nil],
     sonar_stride: [{:integer, 1, 16}, default: 16],
@@ -69,9 +51,9 @@ defmodule Hal.RFlex.Options do
     joystick: [:boolean, default: false],
     home: [{:integer, 0, 255}, default: nil],
     report_period: [{:integer, 20_000, 200_000, "microseconds"}, default: 100_000],
-    pace_ms: [{:integer, 1, 50, "ms"}, default: 12],
-    clock: [:mfa, default: {System, :monotonic_time, [:millisecond]}]
+    pace_ms: [{:integer, 1, 50, "ms"}, default: 12]
   ]
+  @table SerialBase.Options.table(115_200) ++ @own
 
   @enforce_keys Keyword.keys(@table)
   defstruct @enforce_keys
@@ -91,8 +73,8 @@ defmodule Hal.RFlex.Options do
   @spec new(keyword()) :: {:ok, t()} | {:error, String.t()}
   def new(options) do
     with {:ok, given} <- Options.check(options, @table, "rflex"),
-         {:ok, _line} <- Serial.options(line(given)),
-         {:ok, limits} <- limits(given[:limits], given[:profile]),
+         {:ok, _line} <- Serial.options(SerialBase.Options.line(given)),
+         {:ok, limits} <- SerialBase.Options.limits(given[:limits], given[:profile], "rflex"),
          {:ok, bumpers} <- bumpers(given[:bumpers], given[:profile]),
          conversions = struct!(Conversions, given[:conversions]),
          # Without the option `profile`, the robot file checks this itself.
@@ -101,20 +83,6 @@ defmodule Hal.RFlex.Options do
       {:ok, struct!(__MODULE__, Keyword.merge(given, new))}
     end
   end
-
-  @doc "The options for `Hal.Serial.open/1`, without last words."
-  @spec line(keyword() | t()) :: keyword()
-  def line(%__MODULE__{} = options), do: line(Map.to_list(Map.from_struct(options)))
-
-  def line(options) do
-    port = if options[:port] == nil, do: [], else: [port: options[:port]]
-    port ++ [speed: options[:speed]] ++ options[:serial]
-  end
-
-  @doc "The name by which people know the line: its device, or the link of its pseudo-terminal."
-  @spec line_name(t() | keyword()) :: String.t() | nil
-  def line_name(%__MODULE__{} = options), do: options.port || options.serial[:pty]
-  def line_name(options), do: options[:port] || options[:serial][:pty]
 
   @doc false
   def profile(kind) when kind in [:magellan, :atrv_mini], do: {:ok, apply(Profile, kind, [])}
@@ -131,21 +99,6 @@ defmodule Hal.RFlex.Options do
     type = {:number, least, most}
     type = if is_list(value), do: {:list, type}, else: type
     with {:error, _problems} <- Options.Type.read(type, value), do: false
-  end
-
-  # Limits may not exceed what the body can do.
-  defp limits(limits, profile) do
-    case Enum.find(limits, fn {key, value} -> value > Map.get(profile, key, 10.0) end) do
-      nil ->
-        defaults =
-          for key <- Enum.take(Keyword.keys(@limits), 4), do: {key, Map.fetch!(profile, key)}
-
-        {:ok, SlewLimiter.new(Keyword.merge(defaults, limits))}
-
-      {key, value} ->
-        most = "a number above 0 and up to #{Map.fetch!(profile, key)}, what the body can do,"
-        Options.refuse("rflex", [:limits, key], value, most)
-    end
   end
 
   # Works out which sensors a base has on which boards: from the options and, for what they leave out, from

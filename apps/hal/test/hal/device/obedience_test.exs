@@ -39,6 +39,13 @@ defmodule Hal.Device.ObedienceTest do
     assert Obedience.opened(obedience).refusals.look.count == 27
   end
 
+  test "what is no speed counts as a stop, and ends nothing" do
+    for wrong <- [:nan, 1, nil] do
+      told = Obedience.told(Obedience.new(), %Twist{linear: wrong, turn: 0.0})
+      assert told |> hear(wheels(0.0), 0..4_000) |> Obedience.judge(:drive) == :ok
+    end
+  end
+
   test "one refusal, or three at once, are no reason to be offline" do
     refusal = {:refused, :zoom, "no"}
     {_, _, obedience} = Obedience.heard(Obedience.new(), List.duplicate(refusal, 3), nil, 0)

@@ -36,4 +36,9 @@ defmodule Sim.Emulator.Core do
 
   @doc "Switches the device off and on."
   @callback restart(core(), at_ms :: integer()) :: core()
+
+  @doc "For a base: the speed that its motors give its wheels at this time."
+  @callback wheels(core(), at_ms :: integer()) :: Hal.Twist.t()
+
+  @optional_callbacks wheels: 2
 end

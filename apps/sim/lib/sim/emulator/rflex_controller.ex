@@ -152,6 +152,12 @@ defmodule Sim.Emulator.RFlexController do
     wish(%{core | out: []}, Enum.reverse(core.out))
   end
 
+  @impl Sim.Emulator.Core
+  def wheels(%RFlexController.State{off?: true}, _at_ms), do: Twist.zero()
+
+  def wheels(%RFlexController.State{} = core, at_ms),
+    do: core.motors |> Motors.advance(at_ms) |> Motors.wanted()
+
   defp give_up(%{buffer_ms: since_ms, options: %{give_up_ms: wait_ms}} = core, at_ms)
        when since_ms != nil and at_ms - since_ms >= wait_ms do
     {frames, rest, bad} = Frame.give_up(core.buffer)

@@ -16,6 +16,9 @@ defmodule Mix.Tasks.Bench do
   `mix bench stop` measures how long it takes from a crash, a freeze, a bumper or an emergency
   stop to the stop on the serial line of a base.
 
+  `mix bench bases` measures what the wheels of each kind of base do when what commands them is killed, frozen or silent,
+  and when the cable is pulled.
+
   `mix bench vision` measures how long a frame takes in the native backend, with and without the
   call from Elixir, beside a copy of the frame and the other backends.
 
@@ -35,6 +38,7 @@ defmodule Mix.Tasks.Bench do
     "explore" => Bench.Explore.Main,
     "swarm" => Bench.Mesh.Main,
     "stop" => Bench.Stop.Main,
+    "bases" => Bench.Bases.Main,
     "vision" => Bench.Vision.Main,
     "scale" => Bench.Scale.Main,
     "page" => Bench.Page.Main,
@@ -66,7 +70,7 @@ defmodule Mix.Tasks.Bench do
     do:
       refuse([
         "mix bench needs a command: mix bench demo [options], mix bench goto [options], mix bench explore [options], " <>
-          "mix bench swarm [options], mix bench stop [options], mix bench vision [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
+          "mix bench swarm [options], mix bench stop [options], mix bench bases [options], mix bench vision [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
       ])
 
   defp of_mission(%{"mission" => mission} = given) do

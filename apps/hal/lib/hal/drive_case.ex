@@ -1,0 +1,337 @@
+defmodule Hal.DriveCase do
+  @moduledoc """
+  Runs any drive at a base that is emulated, and says what does not hold that must hold for all. For tests:
+
+      @tag timeout: 300_000
+      test "what holds for every drive" do
+        assert Hal.DriveCase.problems({Mine.TextBase, []}, {Sim.Emulator, core: {Mine.TextBase.Emulator, []}}) == []
+      end
+
+  `Hal.Device` runs the driver, as in a robot, with the base's line as its option `port:`; the base is a module with the
+  callbacks below, such as `Sim.Emulator`, whose core has a `wheels/2`. Each rule is a run of its own, in real time: the
+  speed that counts is the one that the base gives its wheels, not the one that the driver reports.
+
+  | rule | must hold |
+  |---|---|
+  | `:options` | an option that it does not know is refused in one line that names it |
+  | `:missing` | a port that is not there is an error, and in words one line that names it |
+  | `:stands` | once it is open the base is online, and stands |
+  | `:drives` | forwards, backwards, left and right are those of its wheels and of its odometry |
+  | `:limits` | whatever is asked, the wheels get no faster than its options allow; what is no speed stops them |
+  | `:stop` | a stop stops them |
+  | `:silence` | so does silence |
+  | `:close` | so does the end of the device |
+  | `:killed` | so does the killing of its process |
+  | `:program` | so does, in the end, the killing of the line's port program, and it comes back |
+  | `:junk` | noise on the line neither ends it nor makes its state grow, and it drives on |
+  | `:messages` | nor do messages that it does not know |
+  | `:arming` | wheels that are not armed stand, whatever is asked; disarmed they stop |
+  | `:unplug` | a pulled cable is an error; once it is back the wheels stand until a person has acknowledged and armed |
+  | `:restart` | a base that is switched off and on is found again, and odometry does not jump in one frame |
+  """
+  alias Hal.{Device, Options, Twist}
+  import Hal.DriveCase.Run
+
+  @doc "Starts a base at the other end of a line, whose link (`link:`) the kit adds to these options."
+  @callback start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
+  @doc "The speed that the base gives its wheels now."
+  @callback wheels(GenServer.server()) :: Twist.t()
+  @doc "Pulls the cable."
+  @callback unplug(GenServer.server()) :: :ok
+  @doc "Plugs it in again."
+  @callback plug(GenServer.server()) :: :ok
+  @doc "Switches the base off and on."
+  @callback restart(GenServer.server()) :: :ok
+  @doc "Puts noise on the line to the driver."
+  @callback noise(GenServer.server(), binary()) :: :ok
+
+  @rules [
+    :options,
+    :missing,
+    :stands,
+    :drives,
+    :limits,
+    :stop,
+    :silence,
+    :close,
+    :killed,
+    :program,
+    :junk,
+    :messages,
+    :arming,
+    :unplug,
+    :restart
+  ]
+  @table [
+    only: [{:list, {:one_of, @rules}}, default: @rules],
+    max_linear: [{:number, 0.01, 10, "m/s"}, default: 0.5],
+    max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
+    sonar: [:boolean, default: false],
+    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
+    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 60_000],
+    seed: [:integer, default: 1]
+  ]
+
+  @doc """
+  What does not hold, one line each. Options: `only` (these rules), `max_linear` and `max_turn` (what the driver's options
+  allow, 0.5 m/s and 1.0 rad/s), `sonar` (whether its base has any), `wait_ms` (how long a busy machine may take for what must come, 20,000), `bytes` (how
+  large the device's state may be, 60,000), `seed` (of the noise). Raises `ArgumentError` for options that are wrong.
+  """
+  @spec problems(driver :: {module(), keyword()}, base :: {module(), keyword()}, keyword()) ::
+          [String.t()]
+  def problems({driver, driver_options}, {base, base_options}, options \\ []) do
+    options = Options.check!(options, @table, "drive case")
+    linear = min(options[:max_linear] / 2, 0.2)
+    turn = min(options[:max_turn] / 2, 0.5)
+
+    case = %Hal.DriveCase.Run{
+      driver: driver,
+      driver_options: driver_options,
+      base: base,
+      base_options: base_options,
+      options: options,
+      speed: {linear, turn}
+    }
+
+    for rule <- options[:only],
+        {:error, line} <- [within_folder(case, &rule(rule, &1))],
+        do: "#{rule}: #{line}"
+  end
+
+  defp rule(:options, t) do
+    case refusal(t, no_such_option: 1) do
+      {:ok, line} -> one_line(line, "no_such_option")
+      :none -> {:error, "no_such_option: 1 is not refused by its init/1 (`ArgumentError`)"}
+    end
+  end
+
+  defp rule(:missing, t) do
+    with_device(t, :auto, fn t ->
+      with {:ok, t} <-
+             await(t, "is not offline, and has no port", &match?({:offline, _}, health(&1))) do
+        {:offline, reason} = health(t)
+        one_line(words(t, reason), t.link)
+      end
+    end)
+  end
+
+  defp rule(:stands, t),
+    do: on_base(t, :auto, &hold(&1, "moves untold", fn t -> standing?(t) end))
+
+  defp rule(:drives, t) do
+    {linear, turn} = t.speed
+
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- goes(t, Twist.new(linear, 0), "forwards", &(&1.linear > 0)),
+           {:ok, t} <- goes(t, Twist.new(-linear, 0), "backwards", &(&1.linear < 0)),
+           {:ok, t} <- goes(t, Twist.new(0, turn), "left", &(&1.turn > 0)),
+           do: goes(t, Twist.new(0, -turn), "right", &(&1.turn < 0))
+    end)
+  end
+
+  defp rule(:limits, t) do
+    %{max_linear: linear, max_turn: turn} = Map.new(t.options)
+    # A base rounds, and has a ramp of its own.
+    within? = fn t ->
+      wheels = wheels(t)
+      abs(wheels.linear) <= 1.05 * linear + 0.02 and abs(wheels.turn) <= 1.05 * turn + 0.05
+    end
+
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t),
+           {:ok, t} <-
+             hold(order(t, Twist.new(99, 0)), "drives faster than #{linear} m/s", within?),
+           {:ok, t} <-
+             hold(order(t, Twist.new(0, -99)), "turns faster than #{turn} rad/s", within?),
+           {:ok, t} <- hold(order(t, Twist.new(99, 99)), "is faster than its limits", within?),
+           {:ok, t} <- stands(order(t, %Twist{linear: :nan, turn: 0.0}), "a speed that is none"),
+           do: alive(t, "a speed that is none")
+    end)
+  end
+
+  defp rule(:stop, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t), do: stands(order(t, Twist.zero()), "a stop")
+    end)
+  end
+
+  defp rule(:silence, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t), do: stands(order(t, nil), "silence")
+    end)
+  end
+
+  defp rule(:close, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t) do
+        close(t.device)
+        stands(order(t, nil), "the end of its device")
+      end
+    end)
+  end
+
+  defp rule(:killed, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t) do
+        Process.exit(t.device, :kill)
+        stands(order(t, nil), "the killing of its process")
+      end
+    end)
+  end
+
+  defp rule(:program, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t), [_ | _] = programs <- programs(t) do
+        for program <- programs, do: {_out, 0} = System.cmd("kill", ["-KILL", "#{program}"])
+
+        with {:ok, t} <- stands(order(t, nil), "the killing of its port program"),
+             {:ok, t} <- online(t),
+             do: rolls(t)
+      else
+        [] -> :ok
+        error -> error
+      end
+    end)
+  end
+
+  defp rule(:junk, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t),
+           {:ok, t} <- noise(t, 40, :rand.seed_s(:exsss, t.options[:seed])),
+           {:ok, t} <- alive(t, "noise on the line"),
+           {:ok, t} <- online(t),
+           {:ok, t} <- rolls(t),
+           do: small(t)
+    end)
+  end
+
+  defp rule(:messages, t) do
+    on_base(t, :auto, fn t ->
+      for junk <- [:junk, {:junk, 1}, {make_ref(), {:data, "junk"}}, nil],
+          do: send(t.device, junk)
+
+      with {:ok, t} <- hold(t, "", fn _t -> true end),
+           {:ok, t} <- rolls(t),
+           do: alive(t, "messages that it does not know")
+    end)
+  end
+
+  defp rule(:arming, t) do
+    on_base(t, :manual, fn t ->
+      driven = order(t, forwards(t))
+
+      with {:ok, t} <- hold(driven, "moves although it is not armed", &standing?/1),
+           {:ok, t} <- armed(t),
+           {:ok, t} <- rolls(t),
+           :ok <- Device.disarm(t.device),
+           {:ok, t} <- stands(t, "being disarmed"),
+           do: hold(t, "moves although it is disarmed", &standing?/1)
+    end)
+  end
+
+  defp rule(:unplug, t) do
+    on_base(t, :manual, fn t ->
+      with {:ok, t} <- armed(t),
+           {:ok, t} <- rolls(t),
+           :ok <- t.base.unplug(t.pid),
+           {:ok, t} <-
+             await(t, "is not offline, and has no cable", &match?({:offline, _}, health(&1))),
+           :ok <- t.base.plug(t.pid),
+           {:ok, t} <- online(t),
+           {:ok, t} <- stands(t, "its cable being back"),
+           {:ok, t} <- hold(t, "moves although its line was lost", &standing?/1),
+           {:error, _acknowledge} <- Device.arm(t.device),
+           :ok <- Device.acknowledge(t.device),
+           {:ok, t} <- armed(t),
+           {:ok, t} <- rolls(t) do
+        unjumped(t)
+      else
+        :ok -> {:error, "may be armed although nobody has acknowledged that its line was lost"}
+        error -> error
+      end
+    end)
+  end
+
+  defp rule(:restart, t) do
+    on_base(t, :auto, fn t ->
+      with {:ok, t} <- rolls(t),
+           :ok <- t.base.restart(t.pid),
+           {:ok, t} <- hold(t, "", fn _t -> true end),
+           {:ok, t} <- online(t),
+           {:ok, t} <- rolls(t),
+           {:ok, t} <- alive(t, "its base's restart"),
+           do: unjumped(t)
+    end)
+  end
+
+  # Steps of the rules: `{:ok, t}`, or `{:error, line}`.
+
+  defp on_base(t, arm, rule) do
+    with_base(t, arm, fn t ->
+      with {:ok, t} <- online(t), do: rule.(t)
+    end)
+  end
+
+  defp forwards(%{speed: {linear, _turn}}), do: Twist.new(linear, 0)
+
+  defp rolls(t) do
+    await(order(t, forwards(t)), "does not drive", &(wheels(&1).linear > 0.5 * elem(t.speed, 0)))
+  end
+
+  defp stands(t, after_what), do: await(t, "does not stand after #{after_what}", &standing?/1)
+
+  # The wheels, and what odometry says of them.
+  defp goes(t, twist, way, right?) do
+    moves? = fn t -> not standing?(t) and right?.(wheels(t)) and right?.(measured(t)) end
+
+    with {:ok, t} <- await(order(t, twist), "does not go #{way}, or does not say so", moves?),
+         do: stands(order(t, Twist.zero()), "a stop on its way #{way}")
+  end
+
+  defp online(t), do: await(t, "does not come online", &(health(&1) == :online))
+
+  defp armed(t), do: await(t, "cannot be armed", fn t -> Device.arm(t.device) == :ok end)
+
+  defp alive(t, after_what) do
+    if Process.alive?(t.device), do: {:ok, t}, else: {:error, "ends after #{after_what}"}
+  end
+
+  defp unjumped(%{jumped?: true}), do: {:error, "its odometry jumps within one frame"}
+  defp unjumped(t), do: {:ok, t}
+
+  # Binaries count, too.
+  defp small(t) do
+    size = t.device |> :sys.get_state() |> :erlang.external_size()
+
+    if size > t.options[:bytes],
+      do: {:error, "its state has #{size} bytes after noise"},
+      else: {:ok, t}
+  end
+
+  # The programs of the device's ports.
+  defp programs(t) do
+    {:links, links} = Process.info(t.device, :links)
+    for port <- links, is_port(port), {:os_pid, pid} <- [Port.info(port, :os_pid)], do: pid
+  end
+
+  defp refusal(t, wrong) do
+    with {:ok, state} <- t.driver.init([port: t.link] ++ wrong ++ t.driver_options),
+         do: t.driver.terminate(state)
+
+    :none
+  rescue
+    refused in ArgumentError -> {:ok, Exception.message(refused)}
+  end
+
+  defp words(t, reason) do
+    if function_exported?(t.driver, :explain, 2),
+      do: t.driver.explain(reason, [port: t.link] ++ t.driver_options),
+      else: "#{inspect(reason)}, because it has no explain/2"
+  end
+
+  defp one_line(line, named) do
+    if String.contains?(line, "\n") or not String.contains?(line, named),
+      do: {:error, "expected one line that names #{named}, got #{inspect(line)}"},
+      else: :ok
+  end
+end
