@@ -9,10 +9,9 @@ defmodule Bench.BasesTest do
   # How fast they stop is for the benchmark to measure, on a machine with nothing else to do.
   test "the wheels of every base stand after what its driver promises", %{tmp_dir: folder} do
     for base <- Bases.bases(), cause <- [:stop, :silence, :kill, :freeze, :program] do
-      assert {base.name, cause, [ms]} =
-               {base.name, cause, Bases.Runner.run(base, cause, 1, folder)}
-
-      assert is_integer(ms)
+      run = Bases.Runner.run(base, cause, 1, folder)
+      assert [ms] = run
+      assert is_integer(ms), inspect({base.name, cause, run})
     end
   end
 
