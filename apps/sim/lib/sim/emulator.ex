@@ -6,9 +6,9 @@ defmodule Sim.Emulator do
 
   | option | meaning |
   |---|---|
-  | `:core` | `{module, options}`, `Sim.Emulator.RFlexController` or `Sim.Emulator.ViscaCamera` |
+  | `:core` | `{module, options}`, a `Sim.Emulator.Core`: `Sim.Emulator.RFlexController`, `.ViscaCamera`, `.RPLidar` or `.Lds` |
   | `:link` | path of the symbolic link to the pseudo-terminal |
-  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` such as `Sim.Device.Drive`, or `nil` for none |
+  | `:body` | `{driver, options}`, a `Hal.Drive`, `Hal.Ptz` or `Hal.Lidar` such as `Sim.Device.Drive`, or `nil` for none |
   | `:wire` | faults of the line in both directions, as in `Sim.Emulator.Wire` |
   | `:name` | as in `GenServer` |
 
@@ -20,6 +20,7 @@ defmodule Sim.Emulator do
   with wheels that the body itself stops, until `thaw/1`; `restart/1` is its power switch.
   """
   use GenServer
+  @behaviour Hal.ScanCase
   alias Hal.{Event, Serial}
   alias Sim.Emulator.Wire
 
@@ -30,6 +31,7 @@ defmodule Sim.Emulator do
               [line: nil, body: nil, plugged?: true, frozen?: false, timer: nil, reason: nil]
 
   @doc "Starts the device; the error says in one line what is wrong with its options."
+  @impl Hal.ScanCase
   @spec start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
@@ -55,10 +57,12 @@ defmodule Sim.Emulator do
   end
 
   @doc "Removes the line."
+  @impl Hal.ScanCase
   @spec unplug(GenServer.server()) :: :ok
   def unplug(emulator), do: GenServer.call(emulator, :unplug)
 
   @doc "Restores the line, under the same link."
+  @impl Hal.ScanCase
   @spec plug(GenServer.server()) :: :ok
   def plug(emulator), do: GenServer.call(emulator, :plug)
 
@@ -71,8 +75,19 @@ defmodule Sim.Emulator do
   def thaw(emulator), do: GenServer.call(emulator, {:freeze, false})
 
   @doc "Switches the device off and on."
+  @impl Hal.ScanCase
   @spec restart(GenServer.server()) :: :ok
   def restart(emulator), do: GenServer.call(emulator, {:change, :restart, []})
+
+  @doc "Puts bytes of noise on the line, as if the device had sent them."
+  @impl Hal.ScanCase
+  @spec noise(GenServer.server(), binary()) :: :ok
+  def noise(emulator, bytes), do: GenServer.call(emulator, {:noise, bytes})
+
+  @doc "What a lidar has around it from now on, if it has no body that says so."
+  @impl Hal.ScanCase
+  @spec see(GenServer.server(), Hal.Scan.t()) :: :ok
+  def see(emulator, scan), do: change(emulator, :feel, [{:scan, scan}, Hal.Clock.now_ms()])
 
   @doc """
   Calls `function` of the core's module with the core and these arguments, such as `:stick` of a
@@ -114,6 +129,11 @@ defmodule Sim.Emulator do
 
   def handle_call({:change, :restart, []}, _from, s),
     do: {:reply, :ok, pump(%{s | core: s.module.restart(s.core, Hal.Clock.now_ms())})}
+
+  def handle_call({:noise, bytes}, _from, s) do
+    if s.line, do: Serial.write(s.line, bytes)
+    {:reply, :ok, s}
+  end
 
   def handle_call({:apply, function, arguments}, _from, s),
     do: {:reply, :ok, pump(%{s | core: apply(s.module, function, [s.core | arguments])})}
