@@ -31,6 +31,9 @@
     # sonar_min: 0.15,
     # sonar_max: 5.1,
     # sonar_cone: deg(30),               # full width
+    # scan: [                            # a lidar; nil for none
+    #   pose: {0.0, 0.0, deg(0)}, rays: 360, field_of_view: deg(360), min: 0.15, max: 12.0, period: 0.1
+    # ],
     # irs: [{0.2, 0.0, deg(0)}, …],
     # ir_max: 0.8,
     # camera: [                          # nil for none
@@ -68,6 +71,9 @@
   # grabber is told norm: :pal (:ntsc, :secam) and input: 1, the number of the socket; any V4L2 device
   # rate: 10 and pixel_format: :mjpeg (:yuyv, :uyvy, …).
   camera: nil,
+
+  # The lidar of a body that has one: {Hal.RPLidar.Driver, port: "/dev/ttyUSB1"}, or nil for none.
+  scan: nil,
 
   # What the camera looks for: a CMVision colour file, searched beside this one. With more to say:
   # [file: "landmark.txt", distance: %{"YellowLandmark" => 0.0651}, min_area: 20, max_area: 0];

@@ -83,6 +83,7 @@ static struct {
     char slave[64];                     /* what the link leads to; empty if none was made */
     unsigned speed;
     int64_t keep_alive_ms;
+    int dtr;                            /* 1 to set the line, 0 to clear it, -1 to leave it */
     int fd;                             /* of the line; -1 when it is closed or lost */
     int absent;                         /* the other end of the pty is not open */
     int done;                           /* 'E' or 'C' was sent */
@@ -434,6 +435,11 @@ static const char *open_device(void)
         return reason_of(errno);
     if (make_raw(s.fd) != 0)
         return errno == EINVAL ? "speed" : reason_of(errno);
+    /* A pty has no such line, and needs none. */
+    if (s.dtr >= 0) {
+        int line = TIOCM_DTR;
+        ioctl(s.fd, s.dtr ? TIOCMBIS : TIOCMBIC, &line);
+    }
     /* But not the output: it may be the last words of the previous program. */
     ioctl(s.fd, TCFLSH, TCIFLUSH);
     return NULL;
@@ -654,6 +660,7 @@ static int parse(int argc, char **argv)
 
     s.speed = 115200;
     s.keep_alive_ms = 200;
+    s.dtr = -1;
     if (argc % 2 != 1)
         return -1;
     for (int k = 1; k < argc; k += 2) {
@@ -671,6 +678,8 @@ static int parse(int argc, char **argv)
             if (parse_number(value, INT_MAX, &number) != 0)
                 return -1;
             s.keep_alive_ms = number;
+        } else if (strcmp(argv[k], "--dtr") == 0) {
+            s.dtr = strcmp(value, "on") == 0;
         } else if (strcmp(argv[k], "--last-words") == 0) {
             if (parse_words(value) != 0)
                 return -1;

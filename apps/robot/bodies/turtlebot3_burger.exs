@@ -1,7 +1,7 @@
-# TurtleBot3 Burger, with the camera of ROBOTIS' model burger_cam. Its lidar is not a range sensor that this version reads.
+# TurtleBot3 Burger, with the camera of ROBOTIS' model burger_cam.
 # Sources: ROBOTIS e-Manual, TurtleBot3, Specifications (size, mass, greatest speeds); turtlebot3_node/param/burger.yaml
 # (wheel separation); turtlebot3_burger_cam.urdf of turtlebot3_simulations (the body about the wheels' axle, the camera's
-# height); the Raspberry Pi's camera module 2 (field of view).
+# height); the Raspberry Pi's camera module 2 (field of view); LDS-01's sheet (ranges, turns), the same urdf (its place).
 [
   about: "a TurtleBot3 Burger",
   mass: 1.0,
@@ -11,6 +11,14 @@
   height: 0.192,
   wheel_base: 0.160,
   limits: [max_linear: 0.22, max_turn: 2.84],
+  # An LDS-01: five turns a second.
+  scan: [
+    pose: {-0.032, 0.0, 0.0},
+    rays: 360,
+    min: 0.12,
+    max: 3.5,
+    period: 0.2
+  ],
   # It is fixed, and looks ahead. body: [camera: nil] for one without.
   camera: [
     width: 320,

@@ -1,7 +1,7 @@
-# TurtleBot3 Waffle Pi. Its lidar is not a range sensor that this version reads.
+# TurtleBot3 Waffle Pi.
 # Sources: ROBOTIS e-Manual, TurtleBot3, Specifications (size, mass, greatest speeds); turtlebot3_node/param/waffle_pi.yaml
 # (wheel separation); turtlebot3_waffle_pi.urdf (the body about the wheels' axle, the camera's height); the Raspberry Pi's
-# camera module 2 (field of view).
+# camera module 2 (field of view); LDS-01's sheet (ranges, turns), the same urdf (its place).
 [
   about: "a TurtleBot3 Waffle Pi",
   mass: 1.8,
@@ -11,6 +11,14 @@
   height: 0.141,
   wheel_base: 0.287,
   limits: [max_linear: 0.26, max_turn: 1.82],
+  # An LDS-01: five turns a second.
+  scan: [
+    pose: {-0.064, 0.0, 0.0},
+    rays: 360,
+    min: 0.12,
+    max: 3.5,
+    period: 0.2
+  ],
   # It is fixed, and looks ahead.
   camera: [
     width: 320,

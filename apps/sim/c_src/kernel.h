@@ -30,6 +30,16 @@ typedef struct {
     size_t sensors;
 } sim_ring;
 
+/* One robot's lidar: its place, then the direction of each ray, two doubles each. */
+typedef struct {
+    size_t self;
+    double x, y, cosine, sine, least, most;
+    const double *geometry;
+    size_t rays;
+} sim_lidar;
+
+enum { SIM_MOST_RAYS = 4096 };
+
 typedef struct {
     int on;
     uint32_t seed, step, robot;
@@ -86,6 +96,10 @@ double sim_wall(const sim_map *map, double x, double y, double rx, double ry, do
 /* The ranges of a robot's sonars. `near` is scratch for `count` discs. */
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges);
+
+/* The ranges of a robot's lidar, two bytes each, the higher first: millimetres, 0 for nothing. */
+void sim_scan(const sim_map *map, const sim_disc *discs, size_t count, const sim_lidar *lidar,
+              const sim_noise *noise, sim_disc *near, uint8_t *ranges);
 
 /* The pieces of poles in a picture, at most width * min(count, height) of them; returns how many. */
 size_t sim_look(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,

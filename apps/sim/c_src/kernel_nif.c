@@ -194,6 +194,66 @@ static ERL_NIF_TERM sonar(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return answer(env, result);
 }
 
+/* {index, x, y, cosine, sine, least, most, geometry}, with a copy of the geometry, which is to be freed. */
+static int get_lidar(ErlNifEnv *env, ERL_NIF_TERM term, sim_lidar *lidar)
+{
+    const ERL_NIF_TERM *e;
+    unsigned self;
+    ErlNifBinary geometry;
+
+    lidar->geometry = NULL;
+    if (!tuple(env, term, 8, &e) || !enif_get_uint(env, e[0], &self) ||
+        !number(env, e[1], -WORLD, WORLD, &lidar->x) || !number(env, e[2], -WORLD, WORLD, &lidar->y) ||
+        !number(env, e[3], -1.1, 1.1, &lidar->cosine) || !number(env, e[4], -1.1, 1.1, &lidar->sine) ||
+        !number(env, e[5], 0.0, 1000.0, &lidar->least) ||
+        !number(env, e[6], 0.0, 65.0, &lidar->most) || !enif_inspect_binary(env, e[7], &geometry) ||
+        geometry.size % (2 * sizeof(double)) != 0 || geometry.size < 2 * sizeof(double) ||
+        geometry.size > 2 * (SIM_MOST_RAYS + 1) * sizeof(double))
+        return 0;
+    lidar->self = self;
+    lidar->rays = geometry.size / (2 * sizeof(double)) - 1;
+    lidar->geometry = doubles(&geometry);
+    return lidar->geometry != NULL && sane(lidar->geometry, 2 * (lidar->rays + 1), 1000.0);
+}
+
+/* scan(map, discs, lidars, noise) */
+static ERL_NIF_TERM scan(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
+{
+    sim_map map;
+    sim_noise noise;
+    ErlNifBinary packed;
+    ERL_NIF_TERM head, tail, row, rows, result = 0;
+    int fine = 1;
+
+    if (argc != 4 || !get_map(env, argv[0], &map) || !enif_inspect_binary(env, argv[1], &packed) ||
+        packed.size % sizeof(sim_disc) != 0 || packed.size / sizeof(sim_disc) > MOST_BODIES ||
+        !get_noise(env, argv[3], &noise))
+        return enif_make_badarg(env);
+
+    size_t count = packed.size / sizeof(sim_disc);
+    sim_disc *discs = (sim_disc *)doubles(&packed);
+    sim_disc *near = enif_alloc((count + 1) * sizeof(sim_disc));
+
+    if (discs != NULL && near != NULL && sane((double *)discs, 3 * count, WORLD)) {
+        rows = enif_make_list(env, 0);
+        for (tail = argv[2]; fine && enif_get_list_cell(env, tail, &head, &tail);) {
+            sim_lidar lidar;
+            fine = get_lidar(env, head, &lidar);
+            if (fine) {
+                sim_scan(&map, discs, count, &lidar, &noise, near,
+                         enif_make_new_binary(env, 2 * lidar.rays, &row));
+                rows = enif_make_list_cell(env, row, rows);
+            }
+            release((void *)lidar.geometry);
+        }
+        if (fine && enif_is_empty_list(env, tail))
+            enif_make_reverse_list(env, rows, &result);
+    }
+    release(discs);
+    release(near);
+    return answer(env, result);
+}
+
 /* The poles of a binary: place, radius and height in doubles, then kind and paint in bytes. */
 static sim_pole *get_poles(ErlNifEnv *env, ERL_NIF_TERM term, size_t *count)
 {
@@ -346,6 +406,8 @@ static ErlNifFunc functions[] = {
     {"field", 3, field, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"sonar_few", 4, sonar, 0},
     {"sonar_many", 4, sonar, ERL_NIF_DIRTY_JOB_CPU_BOUND},
+    {"scan_few", 4, scan, 0},
+    {"scan_many", 4, scan, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"look", 3, look, 0},
     {"join", 2, join, 0},
     {"paint", 5, paint, 0},

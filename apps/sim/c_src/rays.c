@@ -150,6 +150,21 @@ static double meet_discs(const sim_disc *near, size_t count, double rx, double r
     return best;
 }
 
+/* The discs that are within `most` of a sensor, but for the robot's own: an offset, and the squared distance to the edge. */
+static size_t around(const sim_disc *discs, size_t count, size_t self, double ox, double oy,
+                     double most, sim_disc *near)
+{
+    size_t found = 0;
+
+    for (size_t n = 0; n < count; n++) {
+        double mx = discs[n].x - ox, my = discs[n].y - oy, r = discs[n].radius;
+        double m2 = mx * mx + my * my;
+        if (n != self && m2 <= (most + r) * (most + r))
+            near[found++] = (sim_disc){mx, my, m2 - r * r};
+    }
+    return found;
+}
+
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges)
 {
@@ -160,14 +175,8 @@ void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const si
         double ox = ring->x + c * sensor[0] - s * sensor[1];
         double oy = ring->y + s * sensor[0] + c * sensor[1];
         double best = most;
-        size_t found = 0;
+        size_t found = around(discs, count, ring->self, ox, oy, most, near);
 
-        for (size_t n = 0; n < count; n++) {
-            double mx = discs[n].x - ox, my = discs[n].y - oy, r = discs[n].radius;
-            double m2 = mx * mx + my * my;
-            if (n != ring->self && m2 <= (most + r) * (most + r))
-                near[found++] = (sim_disc){mx, my, m2 - r * r};
-        }
         for (size_t n = 0; n < SIM_RAYS; n++) {
             double dx = sensor[2 + 2 * n], dy = sensor[3 + 2 * n];
             double rx = c * dx - s * dy, ry = s * dx + c * dy;
@@ -183,5 +192,44 @@ void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const si
         }
         best = best < ring->least ? ring->least : best;
         ranges[k] = best > most ? most : best;
+    }
+}
+
+/* A range with noise, in millimetres; 0 for a ray that is lost, or ends nearer or farther than the lidar measures. */
+static uint32_t measured(const sim_lidar *lidar, const sim_noise *noise, size_t k, double range)
+{
+    if (range >= lidar->most)
+        return 0;
+    if (noise->on) {
+        uint32_t self = (uint32_t)lidar->self;
+        uint32_t hash = sim_hash(noise->seed, noise->step, self, 0x10000u + (uint32_t)k);
+        double sd = 0.007 * range;
+        if (mix(hash) < 85899345u)
+            return 0;
+        range = range + (sd < 0.003 ? 0.003 : sd) * sim_gauss(hash);
+    }
+    if (range < lidar->least || range > lidar->most)
+        return 0;
+    return (uint32_t)(range * 1000.0 + 0.5);
+}
+
+void sim_scan(const sim_map *map, const sim_disc *discs, size_t count, const sim_lidar *lidar,
+              const sim_noise *noise, sim_disc *near, uint8_t *ranges)
+{
+    const double c = lidar->cosine, s = lidar->sine, most = lidar->most;
+    const double *at = lidar->geometry;
+    double ox = lidar->x + c * at[0] - s * at[1];
+    double oy = lidar->y + s * at[0] + c * at[1];
+    size_t found = around(discs, count, lidar->self, ox, oy, most, near);
+
+    for (size_t k = 0; k < lidar->rays; k++) {
+        double dx = at[2 + 2 * k], dy = at[3 + 2 * k];
+        double rx = c * dx - s * dy, ry = s * dx + c * dy;
+        int axis;
+        double best = meet_discs(near, found, rx, ry, most);
+        double t = sim_wall(map, ox, oy, rx, ry, best, &axis);
+        uint32_t mm = measured(lidar, noise, k, t < best ? t : best);
+        ranges[2 * k] = (uint8_t)(mm >> 8);
+        ranges[2 * k + 1] = (uint8_t)(mm & 255);
     }
 }

@@ -5,6 +5,7 @@ defmodule Console.About do
   alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names, Percept}
   alias Robot.Control.Controller
+  alias Robot.Percept.Snapshot
   alias Swarm.{Member, Status}
   alias Swarm.Status.{Sight, Words}
 
@@ -55,12 +56,12 @@ defmodule Console.About do
     fresh = fresh(entries)
     status = config |> Map.put(:colours, Sim.World.colours()) |> Status.of_board(fresh, board)
     turn = with {%Odometry{twist: twist}, _age_ms} <- fresh[:odometry], do: twist.turn
-    status |> told() |> Map.merge(%{turn: turn, sonar: sonar(config.profile, fresh[:sonar])})
+    status |> told() |> Map.merge(%{turn: turn}) |> Map.merge(hears(config.profile, fresh))
   end
 
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
-  @readings [:odometry, :sonar, :ptz, :detections, :doing, :driving, :pose, :uncertainty]
+  @readings [:odometry, :sonar, :scan, :ptz, :detections, :doing, :driving, :pose, :uncertainty]
   @power_ms 60_000
 
   defp fresh(entries) do
@@ -106,6 +107,7 @@ defmodule Console.About do
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
       sonar: [],
+      cone: :math.pi() / 12,
       seen: nil,
       camera: false,
       pictures: nil,
@@ -145,12 +147,20 @@ defmodule Console.About do
   @spec picture(atom()) :: {:ok, binary()} | {:error, line :: String.t()}
   def picture(robot), do: Swarm.Camera.snapshot(robot)
 
-  # Where each sonar is on the body, where it looks, and how far the nearest thing is: metres and radians.
-  defp sonar(_profile, nil), do: []
+  # Where each sonar, or beam of a lidar, is on the body, where it looks, how far the nearest thing is, and how wide it looks to
+  # each side: metres and radians.
+  defp hears(profile, fresh) do
+    fetch = fn key, _limit_ms ->
+      with {value, age_ms} <- fresh[key], do: {:ok, value, age_ms}, else: (nil -> :error)
+    end
 
-  defp sonar(profile, {ranges, _age_ms}) do
-    for {%Pose{} = at, range} <- Enum.zip(profile.sonars, ranges),
-        do: [at.x, at.y, at.heading, range]
+    {body, ranges} = Snapshot.ranges(profile, fetch)
+
+    sonar =
+      for {%Pose{} = at, range} when range != nil <- Enum.zip(body.sonars, ranges || []),
+          do: [at.x, at.y, at.heading, range]
+
+    %{sonar: sonar, cone: body.sonar_cone / 2}
   end
 
   defp seen({%{blobs: [first | _] = blobs}, _age_ms}) do

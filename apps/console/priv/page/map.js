@@ -216,10 +216,10 @@ export class FloorView {
     c.globalAlpha = 1;
   }
 
-  // What the sonars of the chosen robot see, as cones of 15 degrees to each side.
+  // What the chosen robot hears: its sonars, or the beams of its lidar, as cones.
   cones(c, r, theme) {
     if (!r?.alive) return;
-    const half = Math.PI / 12;
+    const half = this.about.cone;
     const [cos, sin] = [Math.cos(r.a), Math.sin(r.a)];
     c.fillStyle = theme("--accent");
     c.globalAlpha = 0.15;

@@ -1,11 +1,11 @@
 defmodule Hal.Device do
   @moduledoc """
-  Runs any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`) in a process: it opens the driver after its own start, passes
+  Runs any driver (`Hal.Drive`, `Hal.Ptz`, `Hal.Camera`, `Hal.Lidar`) in a process: it opens the driver after its own start, passes
   its readings on, and reopens it after errors.
 
   Options:
 
-    * `:kind` - `:drive`, `:ptz` or `:camera`
+    * `:kind` - `:drive`, `:ptz`, `:camera` or `:scan`, which is a lidar
     * `:driver` - `{module, options}`
     * `:sinks` - `[{m, f, a}]`; each reading goes to `apply(m, f, a ++ [reading])`. A change of
       health is the reading `{:health, device, {:online | {:offline, reason}, since_ms}}`
@@ -27,7 +27,7 @@ defmodule Hal.Device do
   that does not answer, the state of the wheels is unknown. A drive is online once its base has
   reported its wheels since the opening, and while these reports keep coming
   (`Hal.Device.Reports`); otherwise it is offline with the reason `:silent`, although its driver
-  stays open. A camera or a pan-tilt unit is online from its first reading. A camera without a
+  stays open. A camera, a lidar or a pan-tilt unit is online from its first reading. A camera or a lidar without a
   reading for 10 s, and a pan-tilt unit without one in its first 10 s, is offline (`:mute`) and is
   reopened (`Hal.Device.Liveness`).
 
@@ -78,7 +78,7 @@ defmodule Hal.Device do
   # It must come to an order to arm so much earlier that its answer is in time.
   @answer_ms 100
 
-  @type kind :: :drive | :ptz | :camera
+  @type kind :: :drive | :ptz | :camera | :scan
   @type status :: {:online | {:offline, reason :: term()}, since_ms :: integer()}
 
   @doc "Starts the device, which then opens its driver. Wrong options raise `ArgumentError`."

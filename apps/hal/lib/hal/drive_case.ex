@@ -7,8 +7,8 @@ defmodule Hal.DriveCase do
         assert Hal.DriveCase.problems({Mine.TextBase, []}, {Sim.Emulator, core: {Mine.TextBase.Emulator, []}}) == []
       end
 
-  `Hal.Device` runs the driver, as in a robot, with the base's line as its option `port:`; the base is a module with the
-  callbacks below, such as `Sim.Emulator`, whose core has a `wheels/2`. Each rule is a run of its own, in real time: the
+  `Hal.Device` runs the driver, as in a robot, with the base's line as its option `port:`; the base is a `Hal.Emulated` with the
+  callback below, such as `Sim.Emulator`, whose core has a `wheels/2`. Each rule is a run of its own, in real time: the
   speed that counts is the one that the base gives its wheels, not the one that the driver reports.
 
   | rule | must hold |
@@ -32,18 +32,8 @@ defmodule Hal.DriveCase do
   alias Hal.{Device, Options, Twist}
   import Hal.DriveCase.Run
 
-  @doc "Starts a base at the other end of a line, whose link (`link:`) the kit adds to these options."
-  @callback start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
   @doc "The speed that the base gives its wheels now."
   @callback wheels(GenServer.server()) :: Twist.t()
-  @doc "Pulls the cable."
-  @callback unplug(GenServer.server()) :: :ok
-  @doc "Plugs it in again."
-  @callback plug(GenServer.server()) :: :ok
-  @doc "Switches the base off and on."
-  @callback restart(GenServer.server()) :: :ok
-  @doc "Puts noise on the line to the driver."
-  @callback noise(GenServer.server(), binary()) :: :ok
 
   @rules [
     :options,

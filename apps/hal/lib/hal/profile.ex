@@ -11,9 +11,12 @@ defmodule Hal.Profile do
   `radius` is that of the circle round all of it, about `base_link`: what it needs to turn on the spot.
 
   `sonar_round_s` is how long the sonars take until each has fired and was reported, in seconds: so old is a range at most
-  while none is lost. It is 0 if all fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`).
+  while none is lost. It is 0 if all fire at once; a driver that knows better says so (`c:Hal.Drive.sonar_round_s/1`). With a
+  lidar it is at least the time of a turn.
 
   `bumpers` are so many segments round the body, the first ahead, of which those within `bumper_span` about it exist.
+  `scan` is a lidar: its pose, how many rays it has in a turn, how wide it sees (radians, in the middle of which is the heading
+  of its pose), its least and greatest range (metres), and the time of a turn (s); `nil` for a body without one (`Hal.Scan`).
   `camera` is `nil` for a body without one. `about` is what people call it, `mass` is in kg; `nil` if that is not known.
   `rflex` says whose published wiring and conversions an rFLEX controller in it has, `nil` for none.
   """
@@ -31,6 +34,16 @@ defmodule Hal.Profile do
     tilt_rate: 0.873
   }
 
+  # One turn of many small ones, round.
+  @scan %{
+    pose: %Pose{x: 0.0, y: 0.0, heading: 0.0},
+    rays: 360,
+    field_of_view: 2 * :math.pi(),
+    min: 0.15,
+    max: 12.0,
+    period: 0.1
+  }
+
   @enforce_keys [:name, :radius, :length, :width, :wheel_base, :max_linear, :max_turn, :sonars]
   defstruct @enforce_keys ++
               [
@@ -45,12 +58,22 @@ defmodule Hal.Profile do
                 sonar_max: 5.1,
                 sonar_cone: :math.pi() / 6,
                 sonar_round_s: 0.0,
+                scan: nil,
                 irs: [],
                 ir_max: 0.8,
                 bumpers: 16,
                 bumper_span: 2 * :math.pi(),
                 camera: @camera
               ]
+
+  @type scan :: %{
+          pose: Pose.t(),
+          rays: pos_integer(),
+          field_of_view: float(),
+          min: float(),
+          max: float(),
+          period: float()
+        }
 
   @type t :: %__MODULE__{
           name: atom(),
@@ -72,6 +95,7 @@ defmodule Hal.Profile do
           sonar_max: float(),
           sonar_cone: float(),
           sonar_round_s: float(),
+          scan: scan() | nil,
           irs: [Pose.t()],
           ir_max: float(),
           bumpers: 0..16,
@@ -141,6 +165,10 @@ defmodule Hal.Profile do
           Enum.map(left, fn {x, y, angle} -> Pose.new(x, -y, -angle) end)
     }
   end
+
+  @doc "The lidar of a body that says no more of it."
+  @spec scan() :: scan()
+  def scan, do: @scan
 
   @doc "The camera of a body that says no more of it."
   @spec camera() :: map()

@@ -30,6 +30,7 @@ defmodule Hal.Serial do
   | `:speed` | baud, 1 to 20,000,000 | `115_200` |
   | `:last_words` | binary of at most 1024 bytes | `<<>>`: none |
   | `:keep_alive_ms` | 10 to 60,000 | `200` |
+  | `:dtr` | whether the line of this name is set: some devices are switched by it; only `Hal.Serial.Native` | `nil`: as the opening leaves it, which is set |
   | `:module` | `Hal.Serial.Native`, or `Hal.Serial.Circuits`: only `:port`, and **no last words** when the VM is killed, frozen or has crashed | `Hal.Serial.Native` |
 
   ## Last words
@@ -78,6 +79,7 @@ defmodule Hal.Serial do
       default: <<>>
     ],
     keep_alive_ms: [{:integer, 10, 60_000, "ms"}, default: 200],
+    dtr: [:boolean, default: nil],
     module: [
       {:check, &__MODULE__.line?/1,
        "Hal.Serial.Native, or Hal.Serial.Circuits where circuits_uart is (MIX_TARGET),"},

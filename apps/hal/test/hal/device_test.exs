@@ -285,7 +285,7 @@ defmodule Hal.DeviceTest do
   end
 
   test "wrong options are named" do
-    assert_raise ArgumentError, ~r/kind: expected .*:drive, :ptz or :camera/, fn ->
+    assert_raise ArgumentError, ~r/kind: expected .*:drive, :ptz, :camera or :scan/, fn ->
       Device.start_link(kind: :wheels, driver: {Hal.FakeDrive, []})
     end
 

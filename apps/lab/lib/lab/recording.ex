@@ -18,7 +18,7 @@ defmodule Lab.Recording do
   alias Lab.Trial
   alias Lab.Trial.Setup
 
-  @version 6
+  @version 7
   @start "/convoy/start"
   @ticks "/convoy/ticks"
   @encoding "erlang-term"

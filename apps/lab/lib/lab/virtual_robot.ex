@@ -130,7 +130,9 @@ defmodule Lab.VirtualRobot do
         plan: common.plan,
         replace: true,
         trace: trace(common.trace, id)
-      ] ++ camera(robot.profile, device, common) ++ drivers(robot, device, common.folder)
+      ] ++
+        camera(robot.profile, device, common) ++
+        scan(robot.profile, device) ++ drivers(robot, device, common.folder)
     )
   end
 
@@ -138,6 +140,9 @@ defmodule Lab.VirtualRobot do
 
   defp camera(_profile, device, common),
     do: [camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]}]
+
+  defp scan(%{scan: nil}, _device), do: []
+  defp scan(_profile, device), do: [scan: {Sim.Device.Scan, device}]
 
   defp drivers(%{hardware?: true} = robot, _device, folder), do: Hardware.drivers(robot, folder)
 

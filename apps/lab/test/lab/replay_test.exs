@@ -138,7 +138,7 @@ defmodule Lab.ReplayTest do
       other = :erlang.term_to_binary({:convoy, version, %{}})
 
       assert Recording.read_start(other) ==
-               {:error, "is a recording of version #{version}; this program reads version 6"}
+               {:error, "is a recording of version #{version}; this program reads version 7"}
     end
   end
 

@@ -18,7 +18,7 @@ defmodule Record.Recording do
   alias Record.Replay
   alias Record.Replay.Roles
 
-  @version 7
+  @version 8
   @robots "/convoy/robot"
   @trace "/convoy/trace"
   @encoding "erlang-term"

@@ -265,7 +265,7 @@ defmodule Record.ReplayTest do
     for {version, more} <- [{2, [%{}]}, {99, [[], <<>>, 1]}] do
       message = List.to_tuple([:convoy_robots, version | more])
 
-      assert {:error, "is a recording of version #{version}; this program reads version 7"} ==
+      assert {:error, "is a recording of version #{version}; this program reads version 8"} ==
                Recording.read_robots(:erlang.term_to_binary(message))
     end
 
@@ -288,7 +288,7 @@ defmodule Record.ReplayTest do
       bytes = :erlang.term_to_binary(robots)
 
       assert {:error, "begins with something" <> _} =
-               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 7, names, bytes}))
+               Recording.read_robots(:erlang.term_to_binary({:convoy_robots, 8, names, bytes}))
     end
 
     junk = [<<>>, "junk", <<131, 80, 0xFFFFFFFF::32, 0>>, :erlang.term_to_binary([{:mag1, 3}])]
@@ -304,7 +304,7 @@ defmodule Record.ReplayTest do
     robot = <<119, 9, "rover7_ab">>
     <<131, state::binary>> = :erlang.term_to_binary(%{offset_ms: 5, profile: nil})
     robots = <<131, 116, 1::32, robot::binary, state::binary>>
-    told = &:erlang.term_to_binary({:convoy_robots, 7, &1, robots})
+    told = &:erlang.term_to_binary({:convoy_robots, 8, &1, robots})
 
     assert {:error, "begins with something" <> _} = Recording.read_robots(told.([]))
     assert {:ok, %{} = read, 998} = Recording.read_robots(told.(["rover7_ab", "base9_ab@hall"]))

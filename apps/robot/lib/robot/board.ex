@@ -12,6 +12,7 @@ defmodule Robot.Board do
   | `:arming` | `:drive` | `%{state: state, why: line or nil}` (`Hal.Device.Arming`) |
   | `:disarmed` | `:drive` | whether a person has disarmed it |
   | `:ptz` | `:ptz` | as in `Hal.Ptz` |
+  | `:scan` | `:scan` | the newest turn of its lidar (`Hal.Scan`) |
   | `:detections` | `:blob_detector` | `Vision.Detections`, at the time of its picture |
   | `{:health, device}` | the device | `:online` or `{:offline, reason}`, at the time it began |
   | `{:peer, id}` | `:comms` | as in `Robot.Percept` |
@@ -90,6 +91,7 @@ defmodule Robot.Board do
   @type writer ::
           :drive
           | :ptz
+          | :scan
           | :camera
           | :blob_detector
           | :comms
@@ -112,6 +114,7 @@ defmodule Robot.Board do
     arming: :drive,
     disarmed: :drive,
     ptz: :ptz,
+    scan: :scan,
     detections: :blob_detector,
     driving: :gate,
     frame: :gate,

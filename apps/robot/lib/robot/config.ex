@@ -5,7 +5,7 @@ defmodule Robot.Config do
     * `:id` - an atom, such as `:mag1`
     * `:profile` - its body, `%Hal.Profile{}`
     * `:drive` - `{driver, options}`, an implementation of `Hal.Drive`
-    * `:ptz`, `:camera` - the same for `Hal.Ptz` and `Hal.Camera`, or `nil` for none (the default)
+    * `:ptz`, `:camera`, `:scan` - the same for `Hal.Ptz`, `Hal.Camera` and `Hal.Lidar`, or `nil` for none (the default)
     * `:start` - its pose when it is switched on, in the `map` frame; `%Hal.Pose{}`, default the
       origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
@@ -55,6 +55,7 @@ defmodule Robot.Config do
               [
                 ptz: nil,
                 camera: nil,
+                scan: nil,
                 start: Pose.new(0, 0),
                 colours: nil,
                 save_pictures: nil,
@@ -87,6 +88,7 @@ defmodule Robot.Config do
           drive: module_options(),
           ptz: module_options() | nil,
           camera: module_options() | nil,
+          scan: module_options() | nil,
           start: Pose.t(),
           colours: struct() | nil,
           save_pictures: keyword() | nil,
@@ -159,6 +161,7 @@ defmodule Robot.Config do
       drive: [:driver, required: true],
       ptz: [:driver, default: nil],
       camera: [:driver, default: nil],
+      scan: [:driver, default: nil],
       start: {:struct, Pose},
       colours: [{:struct, Vision.Colours}, default: nil],
       save_pictures: [{:keys, Vision.Saver.Options.table()}, default: nil],
@@ -215,6 +218,9 @@ defmodule Robot.Config do
     end
   end
 
+  defp slower(nil, seconds), do: seconds
+  defp slower(%{period: period}, seconds), do: max(period, seconds)
+
   # Without the callback all sonars fire at once.
   defp with_sonars(%{drive: {driver, options}, profile: profile} = config) do
     if Code.ensure_loaded?(driver) and function_exported?(driver, :sonar_round_s, 1),
@@ -224,7 +230,12 @@ defmodule Robot.Config do
 
   defp round(config, seconds)
        when is_float(seconds) and seconds >= 0.0 and seconds <= @longest_round_s,
-       do: {:ok, %{config | profile: %{config.profile | sonar_round_s: seconds}}}
+       do:
+         {:ok,
+          %{
+            config
+            | profile: %{config.profile | sonar_round_s: slower(config.profile.scan, seconds)}
+          }}
 
   defp round(_config, seconds) do
     {:error,

@@ -10,6 +10,7 @@ defmodule Robot.Devices do
       |-- Hal.Device :drive    wheels, ranges, bumpers, battery --> board, and what reflexes need
       |                        --> gate; whether the wheels may turn --> executive and pilot
       |-- Hal.Device :ptz      --> board, and where the camera looked --> blob detector
+      |-- Hal.Device :scan     --> board, and what reflexes need --> gate (a lidar)
       `-- Hal.Device :camera   --> blob detector --> board, and --> view
 
   The blob detector is here, and not a direct child of the robot's supervisor, because a picture
@@ -26,7 +27,7 @@ defmodule Robot.Devices do
   alias Robot.Control.Pilot
   alias Robot.Safety.Gate
 
-  @roles [:blob_detector, :view, :saver, :speech, :drive, :ptz, :camera]
+  @roles [:blob_detector, :view, :saver, :speech, :drive, :ptz, :scan, :camera]
   @patience_ms 5_000
 
   @doc "Starts the devices of a robot whose board is running."
@@ -54,6 +55,7 @@ defmodule Robot.Devices do
           {Pilot, :sense, [id]}
         ]) ++
         device(config, board, :ptz, [write.(:ptz) | if(config.camera, do: [to_aim], else: [])]) ++
+        device(config, board, :scan, [write.(:scan), {Gate, :sense, [id]}]) ++
         device(config, board, :camera, [{__MODULE__, :health, [board]}, to_detector, to_view])
 
     Supervisor.init(children, strategy: :one_for_one, max_restarts: 200, max_seconds: 5)

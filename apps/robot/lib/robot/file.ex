@@ -26,6 +26,7 @@ defmodule Robot.File do
               [
                 ptz: nil,
                 camera: nil,
+                scan: nil,
                 colours: nil,
                 save_pictures: nil,
                 limits: [],
@@ -50,6 +51,7 @@ defmodule Robot.File do
           drive: Robot.Config.module_options(),
           ptz: Robot.Config.module_options() | nil,
           camera: Robot.Config.module_options() | nil,
+          scan: Robot.Config.module_options() | nil,
           colours: struct() | nil,
           save_pictures: keyword() | nil,
           limits: keyword(float()),
@@ -74,6 +76,7 @@ defmodule Robot.File do
     :drive,
     :ptz,
     :camera,
+    :scan,
     :colours,
     :save_pictures,
     :limits,
@@ -195,6 +198,7 @@ defmodule Robot.File do
       [
         named(robot, file),
         seen(robot),
+        scanned(robot),
         kept(robot),
         placed(robot),
         shared(robot),
@@ -224,6 +228,12 @@ defmodule Robot.File do
 
   defp seen(_robot), do: nil
 
+  # Where it is on the body, says the body.
+  defp scanned(%{scan: scan, profile: %{scan: nil} = body}) when scan != nil,
+    do: {["scan"], "is for a body with a lidar, and #{body.name} has none: body: [scan: […]]"}
+
+  defp scanned(_robot), do: nil
+
   defp kept(%{save_pictures: nil}), do: nil
 
   defp kept(%{camera: nil}),
@@ -236,15 +246,16 @@ defmodule Robot.File do
   end
 
   # A serial line has one device at its other end. A port may be a name in /dev.
-  defp shared(%{drive: {_drive, drive}, ptz: {_head, head}}) do
-    [base, head] = for options <- [drive, head], do: options[:port]
-
-    if is_binary(base) and is_binary(head) and
-         Path.expand(base, "/dev") == Path.expand(head, "/dev"),
-       do: {["ptz", "port"], "is #{inspect(head)}, the drive's: each has a line of its own"}
+  defp shared(%{drive: {_drive, drive}} = robot) do
+    Enum.find_value([:ptz, :scan], fn key ->
+      with {_driver, options} <- Map.fetch!(robot, key),
+           [base, port] when is_binary(base) and is_binary(port) <- [drive[:port], options[:port]],
+           true <- Path.expand(base, "/dev") == Path.expand(port, "/dev"),
+           do:
+             {["#{key}", "port"], "is #{inspect(port)}, the drive's: each has a line of its own"},
+           else: (_another -> nil)
+    end)
   end
-
-  defp shared(_robot), do: nil
 
   defp colour(%{colours: nil}), do: nil
 

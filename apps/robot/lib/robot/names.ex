@@ -3,7 +3,7 @@ defmodule Robot.Names do
   Names the processes of all robots of this node: a `Registry` with the keys `{robot, role}`, so that any
   number of robots can run on one node, and no atom is created at run time.
 
-  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:camera`, `:blob_detector`,
+  Roles: `:robot` (the supervisor), `:board`, `:drive`, `:ptz`, `:scan`, `:camera`, `:blob_detector`,
   `:view`, `:saver`, `:gate`, `:watch`, `:executive`, `:pilot`, and the roles of companions.
 
   Readers use its table, without a message.

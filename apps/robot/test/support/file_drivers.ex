@@ -47,3 +47,16 @@ defmodule Robot.FilePtz do
   @impl Hal.Ptz
   def terminate(_state), do: :ok
 end
+
+defmodule Robot.FileLidar do
+  @moduledoc false
+  # A lidar that takes any options.
+  @behaviour Hal.Lidar
+
+  @impl Hal.Lidar
+  def init(options), do: {:ok, options}
+  @impl Hal.Lidar
+  def handle_message(_message, state), do: {:ok, [], state}
+  @impl Hal.Lidar
+  def terminate(_state), do: :ok
+end

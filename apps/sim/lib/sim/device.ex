@@ -1,6 +1,6 @@
 defmodule Sim.Device do
   @moduledoc """
-  Turns what the server of a simulated world sends into the readings of wheels and pan-tilt units.
+  Turns what the server of a simulated world sends into the readings of wheels, pan-tilt units and lidars.
   """
   alias Sim.Lateness
 

@@ -6,9 +6,9 @@ defmodule Sim.Emulator do
 
   | option | meaning |
   |---|---|
-  | `:core` | `{module, options}`, a `Sim.Emulator.Core` such as `Sim.Emulator.RFlexController`, `Sim.Emulator.Kobuki` or `Sim.Emulator.ViscaCamera` |
+  | `:core` | `{module, options}`, a `Sim.Emulator.Core` such as `Sim.Emulator.RFlexController`, `.Kobuki`, `.ViscaCamera` or `.RPLidar` |
   | `:link` | path of the symbolic link to the pseudo-terminal |
-  | `:body` | `{driver, options}`, a `Hal.Drive` or `Hal.Ptz` such as `Sim.Device.Drive`, or `nil` for none |
+  | `:body` | `{driver, options}`, a `Hal.Drive`, `Hal.Ptz` or `Hal.Lidar` such as `Sim.Device.Drive`, or `nil` for none |
   | `:wire` | faults of the line in both directions, as in `Sim.Emulator.Wire` |
   | `:name` | as in `GenServer` |
 
@@ -20,7 +20,9 @@ defmodule Sim.Emulator do
   with wheels that the body itself stops, until `thaw/1`; `restart/1` is its power switch.
   """
   use GenServer
+  @behaviour Hal.Emulated
   @behaviour Hal.DriveCase
+  @behaviour Hal.ScanCase
   alias Hal.{Event, Serial}
   alias Sim.Emulator.Wire
 
@@ -31,7 +33,7 @@ defmodule Sim.Emulator do
               [line: nil, body: nil, plugged?: true, frozen?: false, timer: nil, reason: nil]
 
   @doc "Starts the device; the error says in one line what is wrong with its options."
-  @impl Hal.DriveCase
+  @impl Hal.Emulated
   @spec start_link(keyword()) :: GenServer.on_start() | {:error, line :: String.t()}
   def start_link(options) do
     {name, options} = Keyword.split(options, [:name])
@@ -57,12 +59,12 @@ defmodule Sim.Emulator do
   end
 
   @doc "Removes the line."
-  @impl Hal.DriveCase
+  @impl Hal.Emulated
   @spec unplug(GenServer.server()) :: :ok
   def unplug(emulator), do: GenServer.call(emulator, :unplug)
 
   @doc "Restores the line, under the same link."
-  @impl Hal.DriveCase
+  @impl Hal.Emulated
   @spec plug(GenServer.server()) :: :ok
   def plug(emulator), do: GenServer.call(emulator, :plug)
 
@@ -75,9 +77,19 @@ defmodule Sim.Emulator do
   def thaw(emulator), do: GenServer.call(emulator, {:freeze, false})
 
   @doc "Switches the device off and on."
-  @impl Hal.DriveCase
+  @impl Hal.Emulated
   @spec restart(GenServer.server()) :: :ok
   def restart(emulator), do: GenServer.call(emulator, {:change, :restart, []})
+
+  @doc "Puts bytes of noise on the line, as if the device had sent them."
+  @impl Hal.Emulated
+  @spec noise(GenServer.server(), binary()) :: :ok
+  def noise(emulator, bytes), do: GenServer.call(emulator, {:noise, bytes})
+
+  @doc "What a lidar has around it from now on, if it has no body that says so."
+  @impl Hal.ScanCase
+  @spec see(GenServer.server(), Hal.Scan.t()) :: :ok
+  def see(emulator, scan), do: change(emulator, :feel, [{:scan, scan}, Hal.Clock.now_ms()])
 
   @doc """
   Calls `function` of the core's module with the core and these arguments, such as `:stick` of a
@@ -95,11 +107,6 @@ defmodule Sim.Emulator do
   @impl Hal.DriveCase
   @spec wheels(GenServer.server()) :: Hal.Twist.t()
   def wheels(emulator), do: GenServer.call(emulator, :wheels)
-
-  @doc "Puts bytes of noise on the line, as if the device had sent them."
-  @impl Hal.DriveCase
-  @spec noise(GenServer.server(), binary()) :: :ok
-  def noise(emulator, bytes), do: GenServer.call(emulator, {:noise, bytes})
 
   @doc "The current state of the device."
   @spec core(GenServer.server()) :: term()

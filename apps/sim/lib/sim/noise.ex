@@ -61,7 +61,14 @@ defmodule Sim.Noise do
   def sign(hash) when (hash >>> 16 &&& 1) == 1, do: 1.0
   def sign(_hash), do: -1.0
 
-  defp mix(x) do
+  @doc """
+  Another hash, from one that has been drawn for the same purpose.
+
+      iex> Sim.Noise.mix(1) == Sim.Noise.mix(2)
+      false
+  """
+  @spec mix(0..0xFFFFFFFF) :: 0..0xFFFFFFFF
+  def mix(x) do
     x = x + 0x9E3779B9 &&& @mask
     x = bxor(x, x >>> 16) * 0x5BD1E95 &&& @mask
     x = bxor(x, x >>> 13) * 0x6C8E9CF &&& @mask

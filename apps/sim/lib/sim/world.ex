@@ -3,7 +3,7 @@ defmodule Sim.World do
   Models a world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
 
   `step/2` acts, moves and senses. Every sensor is fresh after every step: all sonars fire at once
-  and do not disturb each other. A body is a disc of the profile's radius; it stops at contact and
+  and do not disturb each other. Only a lidar has its own period; it sees all of its turn at the end of it. A body is a disc of the profile's radius; it stops at contact and
   is never inside a wall or another body. The landmark is a yellow pole, 0.15 m in radius and 1 m
   high, and solid, too.
 
@@ -164,7 +164,7 @@ defmodule Sim.World do
   end
 
   @doc "What a robot's devices report now; nothing if it is dead."
-  @spec readings(t(), id()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
+  @spec readings(t(), id()) :: [Hal.Drive.reading() | Hal.Ptz.reading() | Hal.Lidar.reading()]
   def readings(%__MODULE__{} = world, id) do
     case Elixir.Map.fetch!(world.robots, id) do
       %Body{alive: false} -> []
@@ -274,6 +274,7 @@ defmodule Sim.World do
 
     world
     |> put_ranges(:sonar, living, discs, world.step, &{&1.sonar_min, &1.sonar_max})
+    |> scan(living, discs)
     |> put_ranges(
       :ir,
       Enum.filter(living, &(&1.infrared != <<>>)),
@@ -281,6 +282,24 @@ defmodule Sim.World do
       -world.step - 1,
       &{0.0, &1.ir_max}
     )
+  end
+
+  # A lidar whose turn ends now.
+  defp scan(world, living, discs) do
+    case Enum.filter(living, &Body.scans?(&1, world.at_ms)) do
+      [] ->
+        world
+
+      bodies ->
+        noise = if world.noise != :off, do: {world.seed, world.step, 0}
+        lidars = Enum.map(bodies, &Body.lidar/1)
+
+        bodies
+        |> Enum.zip(Compute.scan(world.map, discs, lidars, noise))
+        |> Enum.reduce(world, fn {body, ranges}, world ->
+          update(world, body.id, &Body.scanned(&1, ranges, world.at_ms))
+        end)
+    end
   end
 
   # Different kinds of sensors have different draws.

@@ -133,6 +133,65 @@ defmodule Sim.ComputeTest do
     end
   end
 
+  # A mount and rays, of which some are along the axes.
+  defp lidars(map, count) do
+    for index <- 0..(count - 1)//1 do
+      {x, y} = place(map)
+      {c, s} = direction()
+
+      rays =
+        for _ <- 1..60, {a, b} = direction(), into: <<>>, do: <<a::float-native, b::float-native>>
+
+      mount = <<:rand.uniform() - 0.5::float-native, :rand.uniform() - 0.5::float-native>>
+      {index, x, y, c, s, 0.12, 3.5, mount <> rays}
+    end
+  end
+
+  test "for lidars, native and reference agree to the bit, and measure what sonars hear" do
+    for _ <- 1..150 do
+      map = map(plan())
+      discs = discs(map, 6)
+      lidars = lidars(map, 3)
+      noise = noise()
+      scans = Compute.Native.scan_few(map, discs, lidars, noise)
+      assert scans == Reference.scan_few(map, discs, lidars, noise)
+      assert scans == Compute.Native.scan_many(map, discs, lidars, noise)
+
+      # A sonar whose five directions are one ray.
+      [
+        {index, x, y, c, s, least, most,
+         <<mount::binary-size(16), ray::binary-size(16), _::binary>>}
+        | _
+      ] = lidars
+
+      ring = {index, x, y, c, s, 0.0, most, mount <> :binary.copy(ray, 5)}
+      [[range]] = Compute.Native.sonar_few(map, discs, [ring], nil)
+      [<<mm::16, _::binary>> | _] = Compute.Native.scan_few(map, discs, lidars, nil)
+      assert mm == if(range < least or range >= most, do: 0, else: trunc(range * 1000 + 0.5))
+    end
+  end
+
+  test "a lidar loses one ray in fifty, and errs by 0.7 %" do
+    map = {Reference.field(:binary.copy(<<0>>, 200 * 200), 200, 200), 200, 200, 0.05}
+    # Walls are 5 m away in each direction along the axes; 2 m where a disc is.
+    discs =
+      <<0.0::float-native, 0.0::float-native, 0.1::float-native, 2.5::float-native,
+        0.0::float-native, 0.5::float-native>>
+
+    rays = :binary.copy(<<1.0::float-native, 0.0::float-native>>, 4_000)
+
+    lidar =
+      {0, 0.0, 0.0, 1.0, 0.0, 0.12, 3.5, <<0.0::float-native, 0.0::float-native, rays::binary>>}
+
+    [scan] = Compute.Native.scan_few(map, discs, [lidar], {7, 1, 0})
+    heard = for <<mm::16 <- scan>>, mm > 0, do: mm / 1000
+    assert_in_delta length(heard), 3_920, 40
+    mean = Enum.sum(heard) / length(heard)
+    assert_in_delta mean, 2.0, 0.001
+    variance = Enum.sum(for r <- heard, do: (r - mean) * (r - mean)) / length(heard)
+    assert_in_delta :math.sqrt(variance), 0.014, 0.001
+  end
+
   test "a jumping ray meets the wall that a creeping one meets" do
     for _ <- 1..300 do
       {_field, width, height, cell} = map = map(plan())
@@ -219,6 +278,25 @@ defmodule Sim.ComputeTest do
     end)
 
     badarg.(fn -> Compute.Native.sonar_few(map, <<-1::64>>, [], nil) end)
+
+    for geometry <- [<<>>, <<1>>, <<0::64>>, <<-1::128>>, :binary.copy(<<0::128>>, 4_098)] do
+      badarg.(fn ->
+        Compute.Native.scan_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 5.0, geometry}], nil)
+      end)
+    end
+
+    mount = <<0::128>>
+
+    badarg.(fn ->
+      Compute.Native.scan_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 66.0, mount}], nil)
+    end)
+
+    badarg.(fn -> Compute.Native.scan_few(map, <<1>>, [], nil) end)
+    badarg.(fn -> Compute.Native.scan_few(map, <<>>, [] ++ :tail, nil) end)
+
+    assert [<<>>] ==
+             Compute.Native.scan_few(map, <<>>, [{0, 0.0, 0.0, 1.0, 0.0, 0.1, 5.0, mount}], nil)
+
     badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [], {-1, 0, 0}) end)
     badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [] ++ :tail, nil) end)
     badarg.(fn -> Compute.Native.look(map, put_elem(sight, 7, 5000), <<>>) end)

@@ -116,6 +116,44 @@ defmodule Sim.WorldTest do
     assert Enum.at(sonar, 15) == 5.1
   end
 
+  test "a lidar sees all around at the end of each of its turns" do
+    scan = %{Profile.scan() | period: 0.2, max: 3.5, pose: Pose.new(0.1, 0)}
+    body = %{Profile.magellan() | sonars: [], scan: scan}
+
+    world =
+      World.new!(
+        map: hall(2),
+        robots: [
+          %{id: :a, profile: body, pose: Pose.new(0, 0, 0)},
+          %{id: :b, profile: Profile.magellan(), pose: Pose.new(0, 1.5)}
+        ],
+        noise: :off
+      )
+
+    scans = fn world -> for {:scan, scan} <- World.readings(world, :a), do: scan end
+    assert [%Hal.Scan{ranges: ranges, start: start, step: step}] = scans.(world)
+    assert byte_size(ranges) == 720
+    refute List.keymember?(World.readings(world, :a), :sonar, 0)
+
+    # The other robot is to the left, and 10 cm behind the lidar.
+    {direction, nearest} =
+      %Hal.Scan{ranges: ranges, start: start, step: step}
+      |> Hal.Scan.echoes(3.5)
+      |> Enum.min_by(&elem(&1, 1))
+
+    assert_in_delta direction, :math.atan2(1.5, -0.1), 0.02
+    assert_in_delta nearest, :math.sqrt(1.5 * 1.5 + 0.01) - 0.2, 0.002
+
+    turns =
+      for k <- 1..12, reduce: {world, []} do
+        {world, turns} ->
+          world = World.step(world, 50)
+          {world, if(scans.(world) == [], do: turns, else: [50 * k | turns])}
+      end
+
+    assert elem(turns, 1) == [600, 400, 200]
+  end
+
   test "the camera pans at its rate and its picture knows where it looked" do
     world =
       world([robot(:mag1, 0, 0)], landmark: {0.0, 3.0})

@@ -4,7 +4,7 @@ defmodule Swarm.Member do
 
   | input | from |
   |---|---|
-  | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit |
+  | `{:reading, reading, at_ms}` | the drive, the pan-tilt unit, the lidar |
   | `{:detections, detections}` | the blob detector (`Vision.Detections`) |
   | `{:message, term, at_ms}` | another robot |
   | `{:command, command, at_ms}` | a person, with the effect `{:reply, answer}` once its outcome is known |
@@ -31,7 +31,7 @@ defmodule Swarm.Member do
   @type t :: %__MODULE__{lockstep: Lockstep.t()}
 
   @type input ::
-          {:reading, Hal.Drive.reading() | Hal.Ptz.reading(), integer()}
+          {:reading, Hal.Drive.reading() | Hal.Ptz.reading() | Hal.Lidar.reading(), integer()}
           | {:detections, Vision.Detections.t()}
           | {:message, term(), integer()}
           | {:command, term(), integer()}
@@ -64,7 +64,16 @@ defmodule Swarm.Member do
       Keyword.take(options, [:id, :profile, :start, :plan, :seed, :mission, :boot, :colours])
 
     camera = options[:colours] && {__MODULE__, []}
-    others = [drive: {__MODULE__, []}, ptz: {__MODULE__, []}, camera: camera, pace: :manual]
+    scan = options[:profile].scan && {__MODULE__, []}
+
+    others = [
+      drive: {__MODULE__, []},
+      ptz: {__MODULE__, []},
+      camera: camera,
+      scan: scan,
+      pace: :manual
+    ]
+
     config = struct!(Robot.Config, given ++ others)
     board = %{arming: {%{state: :armed, why: nil}, 0}}
     lockstep = Lockstep.new(config, @roles, board, options[:order])

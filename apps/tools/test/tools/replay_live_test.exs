@@ -345,7 +345,7 @@ defmodule Tools.ReplayLiveTest do
   test "another version, and a file that cannot be made, are refused in one line", %{
     tmp_dir: folder
   } do
-    for {version, ours, other} <- [{1, 7, 6}, {99, 7, 6}] do
+    for {version, ours, other} <- [{1, 8, 7}, {99, 8, 7}] do
       path = written(folder, :erlang.term_to_binary({:convoy_robots, version, %{}}), [])
       run = Path.join(folder, "run.mcap")
       {start, _ticks, encoding} = Lab.Recording.topics()

@@ -7,7 +7,7 @@ defmodule Hal.Device.Liveness do
   | device | is online | goes offline |
   |---|---|---|
   | drive | once its base has reported its wheels since the opening, and while it keeps reporting them | by `Hal.Device.Reports`: `:silent`; the driver stays open |
-  | camera | once it has given a picture, or blobs, since the opening | after 10 s without one: `:mute`; it is reopened |
+  | camera, lidar | once it has given a picture or blobs, or a scan, since the opening | after 10 s without one: `:mute`; it is reopened |
   | pan-tilt unit | once it has reported where it looks since the opening | when its driver returns an error; after 10 s without a first reading: `:mute`; it is reopened |
   """
   alias Hal.Device.Reports
@@ -22,18 +22,18 @@ defmodule Hal.Device.Liveness do
   that of a drive.
   """
   @type t :: %__MODULE__{
-          kind: :drive | :ptz | :camera,
+          kind: Hal.Device.kind(),
           since_ms: integer(),
           heard?: boolean(),
           reports: Reports.t() | nil
         }
 
   @doc "A device that has just been opened; `sonar?` says whether a drive's base has sonars."
-  @spec new(:drive | :ptz | :camera, sonar? :: boolean(), at_ms :: integer()) :: t()
+  @spec new(Hal.Device.kind(), sonar? :: boolean(), at_ms :: integer()) :: t()
   def new(:drive, sonar?, at_ms),
     do: %__MODULE__{kind: :drive, since_ms: at_ms, reports: Reports.new(sonar?, at_ms)}
 
-  def new(kind, _sonar?, at_ms) when kind in [:ptz, :camera],
+  def new(kind, _sonar?, at_ms) when kind in [:ptz, :camera, :scan],
     do: %__MODULE__{kind: kind, since_ms: at_ms}
 
   @doc "Takes readings that arrived at this time; an empty list is not a sign of life."

@@ -201,7 +201,7 @@ defmodule Hal.Device.Obedience do
       iex> Obedience.judge(turned, :ptz)
       :ok
   """
-  @spec judge(t(), :drive | :ptz | :camera) :: :ok | {:error, fault()}
+  @spec judge(t(), Hal.Device.kind()) :: :ok | {:error, fault()}
   def judge(%__MODULE__{refusals: refusals} = obedience, kind) do
     refusal =
       Enum.find(refusals, fn {_request, r} ->

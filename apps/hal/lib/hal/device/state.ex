@@ -87,7 +87,7 @@ defmodule Hal.Device.State do
   # Checks the options of `Hal.Device`, where they are listed. Pure.
 
   @table [
-    kind: [{:one_of, [:drive, :ptz, :camera]}, required: true],
+    kind: [{:one_of, [:drive, :ptz, :camera, :scan]}, required: true],
     driver: [:driver, required: true],
     device: [{:check, &is_atom/1, "a name"}, default: nil],
     arm: [{:one_of, [:auto, :manual, :never]}, default: :auto],

@@ -182,8 +182,11 @@ defmodule Hal.Serial.Native do
 
     the_end ++
       ["--speed", "#{options[:speed]}", "--keep-alive", "#{options[:keep_alive_ms]}"] ++
-      ["--last-words", Base.encode16(options[:last_words])]
+      ["--last-words", Base.encode16(options[:last_words])] ++ dtr(options[:dtr])
   end
+
+  defp dtr(nil), do: []
+  defp dtr(on?), do: ["--dtr", if(on?, do: "on", else: "off")]
 
   defp put(line, size, bytes) do
     with :ok <- sign(line, ?W, bytes, now_ms()),

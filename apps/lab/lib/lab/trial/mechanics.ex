@@ -80,7 +80,9 @@ defmodule Lab.Trial.Mechanics do
   end
 
   @doc "What a robot's devices report now."
-  @spec readings(trial(), atom()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
+  @spec readings(trial(), atom()) :: [
+          Hal.Drive.reading() | Hal.Ptz.reading() | Hal.Lidar.reading()
+        ]
   def readings(trial, id), do: World.readings(trial.world, id)
 
   @doc """

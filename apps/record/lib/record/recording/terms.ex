@@ -6,12 +6,13 @@ defmodule Record.Recording.Terms do
   # reader would not know. Here it is a text; read again, it is one of the reader's node, with the
   # same text. Those of one robot stay different from each other, and equal ones stay equal.
   #
-  # A profile is written once for the robot, not in each percept.
-  alias Hal.Profile
+  # A profile is written once for the robot, not in each percept, in which that of a body with a lidar has its beams for sonars.
+  alias Hal.{Profile, Scan}
 
   @reference :"$convoy_reference"
   @process :"$convoy_process"
   @profile :"$convoy_profile"
+  @ring :"$convoy_ring"
 
   @doc """
   The term, with texts for references and processes, and a mark for this profile.
@@ -26,6 +27,11 @@ defmodule Record.Recording.Terms do
   """
   @spec portable(term(), Profile.t() | nil) :: term()
   def portable(%Profile{} = profile, profile), do: @profile
+
+  def portable(%Profile{scan: %{}} = heard, %Profile{} = profile) do
+    if heard == Scan.ring(profile), do: @ring, else: mapped(heard, &portable(&1, profile))
+  end
+
   def portable(map, profile) when is_map(map), do: mapped(map, &portable(&1, profile))
 
   def portable(tuple, profile) when is_tuple(tuple),
@@ -52,6 +58,7 @@ defmodule Record.Recording.Terms do
   end
 
   defp read(@profile, profile), do: profile
+  defp read(@ring, %Profile{} = profile), do: Scan.ring(profile)
   defp read(map, profile) when is_map(map), do: mapped(map, &read(&1, profile))
 
   defp read({@reference, text}, _profile) when is_binary(text),

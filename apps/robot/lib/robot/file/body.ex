@@ -32,11 +32,23 @@ defmodule Robot.File.Body do
      sonar_min: {:number, 0.0, 1.0, "m"},
      sonar_max: {:number, 0.5, 12.0, "m"},
      sonar_cone: {:number, 0.02, 1.6, "rad"},
+     scan: {:or, nil, {:keys, scan()}},
      irs: {:list, pose(2.0), 32},
      ir_max: {:number, 0.05, 6.0, "m"},
      bumpers: {:integer, 0, 16},
      bumper_span: {:number, 0.1, 2 * :math.pi(), "rad"},
      camera: {:or, nil, {:keys, camera()}}}
+  end
+
+  defp scan do
+    [
+      pose: pose(2.0),
+      rays: {:integer, 4, 4_096},
+      field_of_view: {:number, 0.1, 2 * :math.pi(), "rad"},
+      min: {:number, 0.0, 1.0, "m"},
+      max: {:number, 0.5, 60.0, "m"},
+      period: {:number, 0.01, 1.0, "s"}
+    ]
   end
 
   defp camera do
@@ -118,7 +130,10 @@ defmodule Robot.File.Body do
       [] ->
         plain = %{name: name, sonars: [], bumpers: 0, camera: nil}
         shape = values |> Map.new() |> shape()
-        held(struct!(Profile, plain |> Map.merge(shape) |> Map.merge(changes(values, nil))))
+
+        held(
+          timed(struct!(Profile, plain |> Map.merge(shape) |> Map.merge(changes(values, nil))))
+        )
 
       problems ->
         {:error, problems}
@@ -126,7 +141,7 @@ defmodule Robot.File.Body do
   end
 
   def build(_name, values, %Profile{} = base),
-    do: {:ok, struct!(base, changes(values, base.camera))}
+    do: {:ok, base |> struct!(changes(values, base)) |> timed()}
 
   defp missing(values) do
     limits = Keyword.get(values, :limits, [])
@@ -153,6 +168,10 @@ defmodule Robot.File.Body do
 
   defp shape(%{radius: radius}), do: %{length: 2 * radius, width: 2 * radius}
 
+  # What a lidar has seen is as old as its turn.
+  defp timed(%Profile{scan: nil} = profile), do: %{profile | sonar_round_s: 0.0}
+  defp timed(profile), do: %{profile | sonar_round_s: profile.scan.period * 1.0}
+
   # The radius holds what it is drawn with, but for corners.
   defp held(%Profile{length: length, width: width, offset: offset, radius: radius} = profile) do
     least = max(abs(offset) + length / 2, width / 2)
@@ -167,13 +186,22 @@ defmodule Robot.File.Body do
          ]}
   end
 
-  defp changes(values, camera) do
+  defp changes(values, base) do
     {limits, values} = Keyword.pop(values, :limits, [])
+    {camera, scan} = if base, do: {base.camera, base.scan}, else: {nil, nil}
 
     Map.new(limits ++ values, fn
-      {:camera, nil} -> {:camera, nil}
-      {:camera, keys} -> {:camera, Map.merge(camera || Profile.camera(), Map.new(keys))}
-      same -> same
+      {:scan, keys} when is_list(keys) ->
+        {:scan, Map.merge(scan || Profile.scan(), Map.new(keys))}
+
+      {:camera, nil} ->
+        {:camera, nil}
+
+      {:camera, keys} ->
+        {:camera, Map.merge(camera || Profile.camera(), Map.new(keys))}
+
+      same ->
+        same
     end)
   end
 end

@@ -15,13 +15,19 @@ defmodule Robot.File.Device do
   @kinds %{
     drive: {:drive, 2, "Hal.Drive"},
     ptz: {:look, 3, "Hal.Ptz"},
-    camera: {:next, 1, "Hal.Camera"}
+    camera: {:next, 1, "Hal.Camera"},
+    scan: {:handle_message, 2, "Hal.Lidar"}
   }
   # Listed here, so that their names are existing atoms before any of these modules is loaded.
-  @ours %{drive: Hal.RFlex.Driver, ptz: Hal.Visca.Driver, camera: Hal.Camera.FFmpeg}
+  @ours %{
+    drive: Hal.RFlex.Driver,
+    ptz: Hal.Visca.Driver,
+    camera: Hal.Camera.FFmpeg,
+    scan: Hal.RPLidar.Driver
+  }
 
   @doc "The option type of a driver with its options, for a table of `Hal.Options`."
-  @spec type(:drive | :ptz | :camera) :: Type.t()
+  @spec type(Hal.Device.kind()) :: Type.t()
   def type(kind),
     do: {:check, &check(kind, &1), "{driver, options}, such as {#{inspect(@ours[kind])}, […]},"}
 
@@ -115,12 +121,19 @@ defmodule Robot.File.Device do
          refused("a driver of this build such as #{ours}", name) <>
            Suggest.hint(inspect(name), [ours])}
 
-      not function_exported?(name, function, arity) ->
+      not function_exported?(name, function, arity) or (kind == :scan and drives?(name)) ->
         {:error, "names #{inspect(name)}, which is not a #{behaviour}"}
 
       true ->
         {:ok, name}
     end
+  end
+
+  # A lidar is told nothing, so it has no callback that others do not have.
+  defp drives?(module) do
+    Enum.any?([drive: 2, look: 3, next: 1], fn {name, arity} ->
+      function_exported?(module, name, arity)
+    end)
   end
 
   defp refused(allowed, value) do

@@ -40,6 +40,7 @@ defmodule Robot.File.Schema do
      drive: [Device.type(:drive), required: true],
      ptz: {:or, nil, Device.type(:ptz)},
      camera: {:or, nil, Device.type(:camera)},
+     scan: {:or, nil, Device.type(:scan)},
      colours: {:or, nil, Colours.type(context.colours)},
      save_pictures: {:or, nil, {:keys, Vision.Saver.Options.table()}},
      limits: Body.limits(),

@@ -83,6 +83,7 @@ defmodule Robot.File.Summary do
         feels: senses(body, judgement),
         head: robot.ptz && device(robot.ptz),
         camera: robot.camera && device(robot.camera),
+        lidar: robot.scan && device(robot.scan),
         "looks for": colours(robot.colours),
         keeps: pictures(robot.save_pictures),
         records: recording(robot.record),
@@ -201,7 +202,7 @@ defmodule Robot.File.Summary do
   end
 
   defp senses(profile, judgement) do
-    "#{sonars(profile)}, #{length(profile.irs)} infrareds#{unread(profile, judgement)}, " <>
+    "#{sonars(profile)}, #{scan(profile.scan)}#{length(profile.irs)} infrareds#{unread(profile, judgement)}, " <>
       "#{bumpers(profile)}#{blind(profile)}"
   end
 
@@ -209,6 +210,12 @@ defmodule Robot.File.Summary do
 
   defp sonars(%Profile{sonars: sonars, sonar_min: least, sonar_max: most}),
     do: "#{length(sonars)} sonars (#{metres(least)} to #{metres(most)})"
+
+  defp scan(nil), do: ""
+
+  defp scan(scan) do
+    "a lidar of #{scan.rays} rays within #{degrees(scan.field_of_view)} (#{metres(scan.min)} to #{metres(scan.max)}), "
+  end
 
   defp bumpers(%Profile{bumpers: count, bumper_span: span}) when count > 0 and span < 6.28,
     do: "#{count} bumpers round it, those within #{degrees(span)} ahead"

@@ -39,6 +39,7 @@ defmodule Robot.File.Warnings do
   def lines(%Robot.File{} = robot, there?, kind \\ fn _path -> :device end) do
     limits(robot) ++
       unseeing(robot) ++
+      unscanned(robot) ++
       narrow(robot) ++
       drive(robot) ++
       words(robot.drive) ++
@@ -73,8 +74,16 @@ defmodule Robot.File.Warnings do
          else: (nil -> [])
   end
 
+  defp unscanned(%{scan: nil, profile: %{scan: scan, name: name}}) when scan != nil do
+    [
+      "scan: #{name} has a lidar, and no driver reads it: the robot will not drive; body: [scan: nil] is for one without"
+    ]
+  end
+
+  defp unscanned(_robot), do: []
+
   @doc """
-  What a body without sonars cannot do, on one line; `nil` for any other. Nothing slows it before what it does not see.
+  What a body without sonars and lidar cannot do, on one line; `nil` for any other. Nothing slows it before what it does not see.
 
       iex> {:ok, create2} = Robot.File.Bodies.fetch("create2")
       iex> Enum.map([create2, %{create2 | bumpers: 0}, Hal.Profile.magellan()], &Robot.File.Warnings.blind/1)
@@ -82,10 +91,10 @@ defmodule Robot.File.Warnings do
        "create2 has no ranges, and no bumpers: nothing stops it when it touches", nil]
   """
   @spec blind(Profile.t()) :: String.t() | nil
-  def blind(%Profile{sonars: [], bumpers: 0, name: name}),
+  def blind(%Profile{sonars: [], scan: nil, bumpers: 0, name: name}),
     do: "#{name} has no ranges, and no bumpers: nothing stops it when it touches"
 
-  def blind(%Profile{sonars: [], name: name}),
+  def blind(%Profile{sonars: [], scan: nil, name: name}),
     do: "#{name} has no ranges: it stops by its bumpers only, once it touches"
 
   def blind(_ranges), do: nil
@@ -179,7 +188,7 @@ defmodule Robot.File.Warnings do
   end
 
   defp strange(robot, there?, kind) do
-    for {_module, options} <- [robot.drive, robot.ptz],
+    for {_module, options} <- [robot.drive, robot.ptz, robot.scan],
         port = options[:port],
         is_binary(port),
         path = Enum.find([port, Path.expand(port, "/dev")], there?),
@@ -201,7 +210,7 @@ defmodule Robot.File.Warnings do
 
   defp devices(robot, there?) do
     named =
-      for {_module, options} <- [robot.drive, robot.ptz, robot.camera],
+      for {_module, options} <- [robot.drive, robot.ptz, robot.camera, robot.scan],
           path <- paths(options),
           not there?.(path) and not there?.(Path.expand(path, "/dev")),
           do: path

@@ -5,17 +5,21 @@ defmodule Robot.Percept.Snapshot do
   | reading | stale after |
   |---|---|
   | odometry, sonar, infrared, bumpers, what the gate did | 300 ms |
+  | a scan | 500 ms |
   | pan-tilt, detections (by the time of their picture) | 500 ms |
   | battery | 5 s |
+
+  A body with a lidar hears by that: its `sonar` are the beams of the scan, and its `profile` has these for sonars
+  (`Hal.Scan.ring/1`). What is written for sonars so serves lidars, too. Sonars that it has besides count for the gate.
 
   Peers have no limit here: their writer keeps them up to date. The percept has no pose yet:
   `Robot.Localiser` estimates it from this percept.
   """
+  alias Hal.Scan
   alias Robot.{Board, Percept}
 
   @limits [
     odometry: 300,
-    sonar: 300,
     ir: 300,
     bumpers: 300,
     driving: 300,
@@ -23,6 +27,10 @@ defmodule Robot.Percept.Snapshot do
     detections: 500,
     power: 5_000
   ]
+
+  @sonar_ms 300
+  # Up to two turns of a lidar that turns five times a second.
+  @scan_ms 500
 
   @typedoc "Looks up a key whose value may be up to so many milliseconds old."
   @type fetch ::
@@ -40,12 +48,34 @@ defmodule Robot.Percept.Snapshot do
 
   @doc "Fills an empty percept with the readings that `fetch` returns. Pure if `fetch` is."
   @spec build(Percept.t(), fetch()) :: Percept.t()
-  def build(%Percept{} = percept, fetch) do
-    Enum.reduce(@limits, percept, fn {key, limit_ms}, percept ->
+  def build(%Percept{profile: body} = percept, fetch) do
+    {profile, sonar} = ranges(body, fetch)
+
+    Enum.reduce(@limits, %{percept | profile: profile, sonar: sonar}, fn {key, limit_ms},
+                                                                         percept ->
       case fetch.(key, limit_ms) do
         {:ok, value, _at_ms} -> Map.replace!(percept, key, value)
         :error -> percept
       end
     end)
+  end
+
+  @doc """
+  What a body hears: the body with the poses and the limits of what hears, which are its sonars, or the beams of its lidar;
+  and their ranges (metres), `nil` if there are no fresh ones.
+  """
+  @spec ranges(Hal.Profile.t(), fetch()) :: {Hal.Profile.t(), [float() | nil] | nil}
+  def ranges(%{scan: nil} = body, fetch) do
+    case fetch.(:sonar, @sonar_ms) do
+      {:ok, ranges, _at_ms} -> {body, ranges}
+      :error -> {body, nil}
+    end
+  end
+
+  def ranges(%{scan: lidar} = body, fetch) do
+    case fetch.(:scan, @scan_ms) do
+      {:ok, scan, _at_ms} -> {Scan.ring(body), Scan.beams(scan, lidar)}
+      :error -> {Scan.ring(body), nil}
+    end
   end
 end

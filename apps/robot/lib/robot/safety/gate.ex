@@ -3,7 +3,7 @@ defmodule Robot.Safety.Gate do
   Drives the wheels; no other process does. It receives wishes, and 20 times a second sends the drive what
   `Robot.Safety.Reflex` allows of the newest one. If no wish comes for 200 ms, for whatever reason, it stops the robot.
 
-  If `Robot.Safety.Reflex` answers `:now`, for example after a touched bumper or a sonar reading
+  If `Robot.Safety.Reflex` answers `:now`, for example after a touched bumper, a sonar reading or a scan
   while the robot moves, the gate does not wait for the next step.
 
   The gate reads the e-stop latch at its start, so that a restart does not release it. Only
@@ -50,10 +50,11 @@ defmodule Robot.Safety.Gate do
   def forget(robot, then \\ nil),
     do: GenServer.cast(Names.via(robot, :gate), {:forget, then})
 
-  @doc "A sink for the drive: passes on the readings that the reflexes need."
+  @doc "A sink for the drive and the lidar: passes on the readings that the reflexes need."
   @spec sense(robot :: atom(), tuple()) :: :ok
-  def sense(robot, {kind, _value} = reading) when kind in [:odometry, :sonar, :bumpers, :arming],
-    do: GenServer.cast(Names.via(robot, :gate), {:sense, reading})
+  def sense(robot, {kind, _value} = reading)
+      when kind in [:odometry, :sonar, :scan, :bumpers, :arming],
+      do: GenServer.cast(Names.via(robot, :gate), {:sense, reading})
 
   def sense(_robot, _reading), do: :ok
 

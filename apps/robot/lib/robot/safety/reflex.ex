@@ -17,10 +17,10 @@ defmodule Robot.Safety.Reflex do
   | `:refused` | the wish was not a pair of numbers, or was absurdly large: stands |
   | `:absent` | no person has been heard for as long as the robot's file allows (`presence:`), and the wish is not to stand: stands |
   | `:speed` | the profile's greatest speeds |
-  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns |
-  | `:near` | slow enough to stop 0.15 m before what the sonars see in the direction of motion |
-  | `:beside` | slowly past what the sonars see less than 0.15 m beside its way |
-  | `:corner` | a robot longer than wide does not turn a corner into what the sonars see |
+  | `:blind` | no sonar reading for 500 ms, although it has sonars: at most 0.1 m/s, also for the corners of a robot longer than wide that turns; no scan, although it has a lidar: the same, and after 2 s, and before the first one, it stands |
+  | `:near` | slow enough to stop 0.15 m before what sonars and lidar see in the direction of motion |
+  | `:beside` | slowly past what they see less than 0.15 m beside its way |
+  | `:corner` | a robot longer than wide does not turn a corner into what they see |
   | `:fence` | stops before its fence (`Robot.Fence`); no driving without a place |
   | `:acceleration` | the profile's accelerations; braking may be twice as hard |
   | `:bumper` | no driving toward a touched side; driving away and turning are allowed |
@@ -32,7 +32,7 @@ defmodule Robot.Safety.Reflex do
   A reading of the bumpers holds until the next one: bases report changes, and a base that falls
   silent is stopped by its device (`Hal.Device.Reports`).
   """
-  alias Hal.{Odometry, Pose, Profile, Twist}
+  alias Hal.{Odometry, Pose, Profile, Scan, Twist}
   alias Robot.Departure
   alias Robot.Fence
   alias Robot.Safety.Reflex.{Body, Limits}
@@ -52,6 +52,8 @@ defmodule Robot.Safety.Reflex do
                 wish_at_ms: nil,
                 sonar: [],
                 sonar_at_ms: nil,
+                scan: [],
+                scan_at_ms: nil,
                 bumpers: [],
                 latched?: false,
                 armed?: true,
@@ -72,6 +74,8 @@ defmodule Robot.Safety.Reflex do
           wish_at_ms: integer() | nil,
           sonar: [Body.point()],
           sonar_at_ms: integer() | nil,
+          scan: [Body.point()],
+          scan_at_ms: integer() | nil,
           bumpers: [0..15],
           latched?: boolean(),
           armed?: boolean(),
@@ -180,7 +184,7 @@ defmodule Robot.Safety.Reflex do
 
   @doc """
   Takes a reading; readings that no limit needs are ignored. While the robot moves, a touched
-  bumper, a sonar reading and a reading of arming ask for a step `:now`. A reading that is not
+  bumper, a sonar reading, a scan and a reading of arming ask for a step `:now`. A reading that is not
   whole counts as none: the last whole one grows old.
   """
   @spec sense(t(), Hal.Drive.reading() | term(), integer()) :: {t(), urgency()}
@@ -194,6 +198,7 @@ defmodule Robot.Safety.Reflex do
   end
 
   defp whole?({:sonar, ranges}), do: list?(ranges, &finite?/1)
+  defp whole?({:scan, scan}), do: Scan.whole?(scan)
   defp whole?({:bumpers, pressed}), do: list?(pressed, &is_integer/1)
 
   defp whole?({:odometry, %Odometry{pose: %Pose{x: x, y: y, heading: heading}}}),
@@ -214,10 +219,17 @@ defmodule Robot.Safety.Reflex do
   defp urgent?({:arming, _state}), do: true
   defp urgent?({:bumpers, [_ | _]}), do: true
   defp urgent?({:sonar, _ranges}), do: true
+  defp urgent?({:scan, _scan}), do: true
   defp urgent?(_reading), do: false
 
   defp note(reflex, {:sonar, ranges}, at_ms),
     do: %{reflex | sonar: Body.points(reflex.profile, ranges), sonar_at_ms: at_ms}
+
+  # A lidar that the body does not have is nowhere.
+  defp note(%{profile: %{scan: nil}} = reflex, {:scan, _scan}, _at_ms), do: reflex
+
+  defp note(reflex, {:scan, scan}, at_ms),
+    do: %{reflex | scan: Body.scanned(reflex.profile, scan), scan_at_ms: at_ms}
 
   defp note(reflex, {:bumpers, pressed}, _at_ms), do: %{reflex | bumpers: pressed}
 

@@ -47,6 +47,8 @@ defmodule Robot.File.BodiesTest do
     assert %{length: 0.138, width: 0.178, wheel_base: 0.16, max_linear: 0.22, sonars: []} = burger
     assert_in_delta burger.radius, :math.sqrt(0.101 ** 2 + 0.089 ** 2), 1.0e-9
     assert %{max_pan: 0.0} = burger.camera
+    assert %{rays: 360, max: 3.5, period: 0.2, pose: %{x: -0.032}} = burger.scan
+    assert burger.sonar_round_s == 0.2
     assert {:ok, %{radius: 0.17, wheel_base: 0.235, camera: nil}} = Bodies.fetch("create2")
     assert {:ok, %{max_linear: 0.7, max_acceleration: 0.3}} = Bodies.fetch("kobuki")
     assert {:ok, %{sonars: sonars, max_linear: 1.2}} = Bodies.fetch("pioneer3")
@@ -174,11 +176,54 @@ defmodule Robot.File.BodiesTest do
     assert line =~ "id: is :rover1, but the file is named rover2.exs"
   end
 
+  test "a body has a lidar by its keys, which need not be all, or gives its base's away" do
+    lidar = fn values, base ->
+      {:ok, body} = Body.build(:rover, values, base)
+      {body.scan, body.sonar_round_s}
+    end
+
+    {:ok, burger} = Bodies.fetch("burger")
+    whole = [radius: 0.2, wheel_base: 0.3, limits: [max_linear: 0.4, max_turn: 1.0]]
+    assert lidar.(whole, nil) == {nil, 0.0}
+    assert lidar.([scan: []] ++ whole, nil) == {Profile.scan(), 0.1}
+    assert lidar.([scan: [max: 6.0]] ++ whole, nil) == {%{Profile.scan() | max: 6.0}, 0.1}
+    assert lidar.([scan: [max: 8.0]], burger) == {%{burger.scan | max: 8.0}, 0.2}
+    assert lidar.([scan: nil], burger) == {nil, 0.0}
+    assert lidar.([mass: 2.0], burger) == {burger.scan, 0.2}
+  end
+
+  test "a lidar has a driver, and a driver of lidars a body that has one", %{tmp_dir: folder} do
+    text = &"[id: :rex, profile: :#{&1}, drive: {Robot.FileDrive, port: \"/dev/ttyS1\"}#{&2}]"
+
+    load = fn text ->
+      File.write!(Path.join(folder, "rex.exs"), text)
+      Robot.File.load(Path.join(folder, "rex.exs"))
+    end
+
+    {:ok, robot} = load.(text.("burger", ""))
+
+    assert Enum.any?(
+             Warnings.lines(robot, fn _ -> true end),
+             &(&1 =~ "has a lidar, and no driver reads it")
+           )
+
+    assert {:error, [line]} = load.(text.("mag", ", scan: Robot.FileLidar"))
+    assert line =~ "scan: is for a body with a lidar, and magellan has none"
+    assert {:error, [line]} = load.(text.("burger", ", scan: Hal.RFlex.Driver"))
+    assert line =~ "scan: names Hal.RFlex.Driver, which is not a Hal.Lidar"
+
+    assert {:ok, robot} =
+             load.(text.("burger", ", scan: {Robot.FileLidar, port: \"/dev/ttyUSB0\"}"))
+
+    assert Warnings.lines(robot, fn _ -> true end) == []
+    assert Enum.any?(Summary.lines(robot), &(&1 =~ "lidar     Robot.FileLidar on /dev/ttyUSB0"))
+    assert {:ok, %{scan: {Robot.FileLidar, _}}} = Robot.File.config(robot)
+  end
+
   test "a body without ranges is told so" do
     for {name, says} <- [
           {"create2", "create2 has no ranges: it stops by its bumpers only, once it touches"},
-          {"burger",
-           "turtlebot3_burger has no ranges, and no bumpers: nothing stops it when it touches"},
+          {"burger", nil},
           {"pioneer3", nil}
         ] do
       {:ok, body} = Bodies.fetch(name)
@@ -199,7 +244,8 @@ defmodule Robot.File.BodiesTest do
                  else: []
                )
 
-      assert Enum.any?(Summary.lines(robot), &(&1 =~ "no sonars")) == (says != nil)
+      seen = Enum.any?(Summary.lines(robot), &(&1 =~ ~r/a lidar of|\d sonars/))
+      assert seen == (says == nil)
     end
   end
 end

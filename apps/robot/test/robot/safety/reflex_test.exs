@@ -218,6 +218,77 @@ defmodule Robot.Safety.ReflexTest do
     assert twist.linear == 0.5
   end
 
+  describe "with a lidar" do
+    defp lidar, do: %{Profile.magellan() | sonars: [], scan: Profile.scan(), sonar_round_s: 0.1}
+
+    # All of what 360 rays see is far away, but for these degrees.
+    defp scan(near \\ %{}) do
+      degree = :math.pi() / 180
+      rays = for k <- 0..359, into: <<>>, do: Hal.Scan.pack(Map.get(near, k, 9.0))
+      {:scan, %Hal.Scan{start: 0.0, step: degree, ranges: rays}}
+    end
+
+    defp seen(reflex, scan, at_ms), do: reflex |> Reflex.sense(scan, at_ms) |> elem(0)
+
+    defp at_speed(reflex, scan, twist) do
+      for k <- 0..40, reduce: {nil, [], reflex} do
+        {_, _, reflex} ->
+          reflex |> seen(scan, 50 * k) |> Reflex.wish(twist, 50 * k) |> Reflex.step(50 * k)
+      end
+    end
+
+    test "it stops before what a single ray sees, and drives past what is beside or behind" do
+      reflex = Reflex.new(lidar())
+      assert {%{linear: 0.5}, [], _} = at_speed(reflex, scan(), Twist.new(0.5, 0))
+      assert {%{linear: 0.5}, [], _} = at_speed(reflex, scan(%{180 => 0.3}), Twist.new(0.5, 0))
+      assert {stands, [:near | _], _} = at_speed(reflex, scan(%{0 => 0.3}), Twist.new(0.5, 0))
+      assert stands.linear == 0.0
+      assert {slow, [:near | _], _} = at_speed(reflex, scan(%{0 => 0.5}), Twist.new(0.5, 0))
+      assert slow.linear > 0.1 and slow.linear < 0.4
+      # Nearer than it measures: it may touch.
+      assert {%{linear: linear}, _, _} = at_speed(reflex, scan(%{0 => 0.1}), Twist.new(0.5, 0))
+      assert linear == 0.0
+    end
+
+    test "while it moves, a scan does not wait" do
+      {_, _, moving} = at_speed(Reflex.new(lidar()), scan(), Twist.new(0.5, 0))
+      assert {_, :now} = Reflex.sense(moving, scan(), 2_050)
+      assert {^moving, :later} = Reflex.sense(moving, {:scan, :odd}, 2_050)
+      # One that its body does not have is nowhere.
+      assert {reflex, _} = Reflex.sense(gate(), scan(%{0 => 0.3}), 0)
+      assert reflex == gate()
+    end
+
+    test "before the first scan it stands, without fresh ones it creeps, and then stands" do
+      wish = &(&1 |> Reflex.wish(Twist.new(0.5, 0.0), &2) |> Reflex.step(&2))
+      assert {%{linear: unseeing}, [:blind | _], _} = wish.(Reflex.new(lidar()), 0)
+      assert unseeing == 0.0
+
+      {_, _, reflex} = at_speed(Reflex.new(lidar()), scan(), Twist.new(0.5, 0))
+      assert {%{linear: 0.5}, [], reflex} = wish.(reflex, 2_500)
+      {_, _, reflex} = Enum.reduce(2_501..3_500//50, {0, 0, reflex}, &wish.(elem(&2, 2), &1))
+      assert {%{linear: 0.1}, [:blind], reflex} = wish.(reflex, 4_000)
+      {_, _, reflex} = Enum.reduce(4_001..4_400//50, {0, 0, reflex}, &wish.(elem(&2, 2), &1))
+      assert {%{linear: stands}, [:blind], _} = wish.(reflex, 4_450)
+      assert stands == 0.0
+    end
+
+    test "a body with sonars, too, stops before what either sees, and misses either" do
+      body = %{Profile.magellan() | scan: Profile.scan()}
+      reflex = Reflex.new(body)
+      both = fn sonar, scan -> reflex |> seen({:sonar, sonar}, 0) |> seen(scan, 0) end
+      silent = Body.silence(body)
+      ahead = List.replace_at(silent, 11, 0.1)
+      wish = &(&1 |> Reflex.wish(Twist.new(0.5, 0.0), 0) |> Reflex.step(0))
+      assert {%{linear: free}, [:acceleration], _} = wish.(both.(silent, scan()))
+      assert free > 0.0
+      assert {_, [:near], _} = wish.(both.(ahead, scan()))
+      assert {_, [:near], _} = wish.(both.(silent, scan(%{0 => 0.3})))
+      assert {_, [:blind | _], _} = wish.(seen(reflex, scan(), 0))
+      assert {_, [:blind | _], _} = wish.(seen(reflex, {:sonar, silent}, 0))
+    end
+  end
+
   test "without fresh sonars a robot longer than wide turns so that its corners creep, too" do
     mini = Profile.atrv_mini()
 

@@ -13,6 +13,12 @@ defmodule Sim.Compute.Native do
   @spec sonar_many(tuple(), binary(), [tuple()], tuple() | nil) :: [[float()]]
   def sonar_many(_map, _discs, _rings, _noise), do: :erlang.nif_error(:nif_not_loaded)
 
+  @spec scan_few(tuple(), binary(), [tuple()], tuple() | nil) :: [binary()]
+  def scan_few(_map, _discs, _lidars, _noise), do: :erlang.nif_error(:nif_not_loaded)
+
+  @spec scan_many(tuple(), binary(), [tuple()], tuple() | nil) :: [binary()]
+  def scan_many(_map, _discs, _lidars, _noise), do: :erlang.nif_error(:nif_not_loaded)
+
   @spec look(tuple(), tuple(), binary()) :: binary()
   def look(_map, _sight, _poles), do: :erlang.nif_error(:nif_not_loaded)
 

@@ -22,6 +22,23 @@ defmodule Sim.Compute.Rays do
     end
   end
 
+  @doc "The ranges of the rays of a lidar before noise, at most its greatest."
+  @spec lidar(tuple(), [Sim.Compute.disc()], Sim.Compute.lidar()) :: [float()]
+  def lidar(map, others, {_index, x, y, c, s, _least, most, geometry}) do
+    <<sx::float-native, sy::float-native, rays::binary>> = geometry
+    ox = x + c * sx - s * sy
+    oy = y + s * sx + c * sy
+    near = near(others, ox, oy, most)
+
+    for <<dx::float-native, dy::float-native <- rays>> do
+      rx = c * dx - s * dy
+      ry = s * dx + c * dy
+      best = discs(near, rx, ry, most)
+      {t, _axis} = wall(map, ox, oy, rx, ry, best)
+      min(t, best)
+    end
+  end
+
   # Discs as seen from a sensor: offset, and squared distance to their edge.
   defp near(discs, ox, oy, most) do
     for {bx, by, r} <- discs,

@@ -66,6 +66,33 @@ defmodule Sim.Compute.Reference do
 
   defp blur(range, _noise, _index, _k, least, most), do: range |> max(least) |> min(most)
 
+  @doc "See `Sim.Compute.scan/4`."
+  @spec scan_few(tuple(), binary(), [Sim.Compute.lidar()], Sim.Compute.noise()) :: [binary()]
+  def scan_few(map, discs, lidars, noise) do
+    discs = for <<x::float-native, y::float-native, r::float-native <- discs>>, do: {x, y, r}
+
+    Enum.map(lidars, fn {index, _x, _y, _c, _s, least, most, _geometry} = lidar ->
+      ranges = Rays.lidar(map, List.delete_at(discs, index), lidar)
+
+      for {range, k} <- Enum.with_index(ranges),
+          into: <<>>,
+          do: <<measured(range, noise, index, k, least, most)::16>>
+    end)
+  end
+
+  defp measured(range, _noise, _index, _k, _least, most) when range >= most, do: 0
+
+  defp measured(range, {seed, step, _robot}, index, k, least, most) do
+    hash = Noise.hash(seed, step, index, 0x10000 + k)
+    range = range + max(0.003, 0.007 * range) * Noise.gauss(hash)
+    if Noise.mix(hash) < 85_899_345, do: 0, else: millimetres(range, least, most)
+  end
+
+  defp measured(range, nil, _index, _k, least, most), do: millimetres(range, least, most)
+
+  defp millimetres(range, least, most) when range < least or range > most, do: 0
+  defp millimetres(range, _least, _most), do: trunc(range * 1000.0 + 0.5)
+
   @doc "See `Sim.Compute.look/3`: parts of 8 bytes each."
   @spec look(tuple(), tuple(), binary()) :: binary()
   def look(map, sight, poles) do

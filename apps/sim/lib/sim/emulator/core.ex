@@ -22,8 +22,11 @@ defmodule Sim.Emulator.Core do
   @callback hear(core(), bytes :: binary(), at_ms :: integer()) :: core()
 
   @doc "The body reports something, as its driver passes it on."
-  @callback feel(core(), reading :: Hal.Drive.reading() | Hal.Ptz.reading(), at_ms :: integer()) ::
-              core()
+  @callback feel(
+              core(),
+              reading :: Hal.Drive.reading() | Hal.Ptz.reading() | Hal.Lidar.reading(),
+              at_ms :: integer()
+            ) :: core()
 
   @doc "Advances the time: returns the bytes that are sent by now, and what the body should do."
   @callback run(core(), at_ms :: integer()) :: {bytes :: iodata(), [wish()], core()}

@@ -42,6 +42,9 @@ defmodule Sim.World.Body do
                 tilt: 0.0,
                 field_of_view: nil,
                 sonar: [],
+                lidar: <<>>,
+                scan: nil,
+                scan_ms: nil,
                 infrared: <<>>,
                 ir: [],
                 pressed: %{}
@@ -68,6 +71,9 @@ defmodule Sim.World.Body do
           tilt: float(),
           field_of_view: float() | nil,
           sonar: [float()],
+          lidar: binary(),
+          scan: Hal.Scan.t() | nil,
+          scan_ms: integer() | nil,
           infrared: binary(),
           ir: [float()],
           pressed: %{(0..15) => integer()}
@@ -91,6 +97,7 @@ defmodule Sim.World.Body do
       wheels: Map.merge(@wheels, Map.new(Map.get(robot, :wheels, []))),
       field_of_view: profile.camera && profile.camera.field_of_view * 1.0,
       geometry: geometry(profile.sonars, profile.sonar_cone),
+      lidar: rays(profile.scan),
       infrared: if(robot[:infrared], do: geometry(profile.irs, @ir_cone), else: <<>>)
     }
   end
@@ -115,6 +122,49 @@ defmodule Sim.World.Body do
 
       <<x::float-native, y::float-native, rays::binary>>
     end
+  end
+
+  # A lidar has its place and the direction of each ray.
+  defp rays(nil), do: <<>>
+
+  defp rays(%{pose: %Pose{x: x, y: y, heading: heading}, rays: count} = scan) do
+    {start, step} = turn(scan)
+
+    rays =
+      for k <- 0..(count - 1), into: <<>> do
+        {c, s} = Trig.cos_sin(heading + start + k * step)
+        <<c::float-native, s::float-native>>
+      end
+
+    <<x::float-native, y::float-native, rays::binary>>
+  end
+
+  # The rays of a lidar divide what it sees, from the right.
+  defp turn(%{rays: count, field_of_view: field_of_view}) do
+    step = field_of_view / count
+    {(step - field_of_view) / 2, step}
+  end
+
+  @doc "Whether the body has a lidar whose turn ends now."
+  @spec scans?(t(), integer()) :: boolean()
+  def scans?(%__MODULE__{lidar: <<>>}, _at_ms), do: false
+  def scans?(%__MODULE__{scan_ms: nil}, _at_ms), do: true
+
+  def scans?(%__MODULE__{scan_ms: scan_ms, profile: %{scan: scan}}, at_ms),
+    do: at_ms - scan_ms >= scan.period * 1000
+
+  @doc "Its lidar, as `Sim.Compute.scan/4` takes it."
+  @spec lidar(t()) :: Sim.Compute.lidar()
+  def lidar(%__MODULE__{pose: pose, profile: %{scan: scan}} = body) do
+    {c, s} = Trig.cos_sin(pose.heading)
+    {body.index, pose.x, pose.y, c, s, scan.min * 1.0, scan.max * 1.0, body.lidar}
+  end
+
+  @doc "The body whose lidar has measured these ranges."
+  @spec scanned(t(), binary(), integer()) :: t()
+  def scanned(%__MODULE__{profile: %{scan: scan}} = body, ranges, at_ms) do
+    {start, step} = turn(scan)
+    %{body | scan: %Hal.Scan{start: start, step: step, ranges: ranges}, scan_ms: at_ms}
   end
 
   @doc "The speed for the next `dt_ms`, before anything stops the body."
@@ -267,8 +317,13 @@ defmodule Sim.World.Body do
   defp segment?(k, %Profile{bumpers: count, bumper_span: span}),
     do: abs(Pose.wrap(2 * k * :math.pi() / count)) <= span / 2 + 1.0e-9
 
-  @doc "What the robot's devices report now; a body without sonars, or without a camera, reports none of them."
-  @spec readings(t(), integer()) :: [Hal.Drive.reading() | Hal.Ptz.reading()]
+  @doc """
+  What the robot's devices report now; a body without sonars, or without a camera, reports none of them, and a lidar reports
+  only at the end of a turn.
+  """
+  @spec readings(t(), integer()) :: [
+          Hal.Drive.reading() | Hal.Ptz.reading() | Hal.Lidar.reading()
+        ]
   def readings(%__MODULE__{} = body, at_ms) do
     all = [
       {:odometry, %Odometry{pose: body.odometry, twist: body.measured}},
@@ -280,7 +335,8 @@ defmodule Sim.World.Body do
       {:ir, body.ir}
     ]
 
-    Enum.filter(all, fn {sense, _reading} -> has?(body, sense) end)
+    all = Enum.filter(all, fn {sense, _reading} -> has?(body, sense) end)
+    if body.scan != nil and body.scan_ms == at_ms, do: all ++ [{:scan, body.scan}], else: all
   end
 
   defp has?(%{geometry: geometry}, :sonar), do: geometry != <<>>

@@ -57,7 +57,8 @@ defmodule Sim.World.CameraView do
   end
 
   # A camera sees only the outline of the others.
-  defp slim(body, true), do: %{body | sonar: [], geometry: <<>>, ir: [], infrared: <<>>}
+  defp slim(body, true),
+    do: %{body | sonar: [], geometry: <<>>, ir: [], infrared: <<>>, lidar: <<>>, scan: nil}
 
   defp slim(%{profile: %{radius: radius, height: height}} = body, false),
     do: %{
@@ -66,6 +67,8 @@ defmodule Sim.World.CameraView do
         sonar: [],
         geometry: <<>>,
         ir: [],
-        infrared: <<>>
+        infrared: <<>>,
+        lidar: <<>>,
+        scan: nil
     }
 end

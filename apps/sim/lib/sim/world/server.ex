@@ -3,7 +3,7 @@ defmodule Sim.World.Server do
   Runs a world in real time, in steps of 50 ms. Simulated devices attach to it; it sends them their readings, and
   carries out their requests. It does not know processes of robots, only devices.
 
-  After each step a drive and a pan-tilt unit get their readings; after every second step a camera
+  After each step a drive and a pan-tilt unit get their readings, and a lidar what it saw in its turn; after every second step a camera
   that has asked gets what moves, and paints its picture itself on the static ground that it got
   when it attached (`Sim.World.CameraView`). A message to a device is `{:world, server, what}`
   with `{:readings, sent_ms, list}`, `{:ground, ground}`, `{:view, moving}` or
@@ -34,7 +34,7 @@ defmodule Sim.World.Server do
   defstruct @enforce_keys ++
               [devices: %{}, owners: %{}, driven: %{}, asked: MapSet.new()]
 
-  @type kind :: :drive | :ptz | :camera
+  @type kind :: :drive | :ptz | :scan | :camera
   @type change ::
           {:kill, robot :: atom()}
           | {:displace, robot :: atom(), Pose.t()}
@@ -48,7 +48,7 @@ defmodule Sim.World.Server do
   end
 
   @doc """
-  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit or
+  Attaches the calling process to a robot's body in a world, as its drive, pan-tilt unit, lidar or
   camera, in place of the previous one. The calling process monitors the server; returns the
   reference of that monitor.
   """
@@ -204,11 +204,15 @@ defmodule Sim.World.Server do
 
   defp tell(%{devices: devices, world: world}) do
     for id <- world.order do
-      {ptz, readings} = world |> World.readings(id) |> Enum.split_with(&match?({:ptz, _}, &1))
-      tell(devices, {id, :drive}, readings)
-      tell(devices, {id, :ptz}, ptz)
+      readings = world |> World.readings(id) |> Enum.group_by(&device/1)
+
+      for kind <- [:drive, :ptz, :scan],
+          do: tell(devices, {id, kind}, Map.get(readings, kind, []))
     end
   end
+
+  defp device({kind, _reading}) when kind in [:ptz, :scan], do: kind
+  defp device(_reading), do: :drive
 
   defp tell(_devices, _device, []), do: :ok
 

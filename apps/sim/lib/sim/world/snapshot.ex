@@ -3,7 +3,7 @@ defmodule Sim.World.Snapshot do
   Packs the changes of a world since its start, small enough to send ten times a second; together with the initial world
   they restore the whole world. Pure.
 
-  A world that is started from a snapshot goes on where it was; only the sonars are fired again by
+  A world that is started from a snapshot goes on where it was; only the sonars are fired again, and the lidars turned, by
   its first step.
   """
   alias Hal.Pose

@@ -27,6 +27,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Hal.{Device, Pose}
   alias Robot.{Board, Names}
   alias Robot.Control.Delivery
+  alias Robot.Percept.Snapshot
   alias Robot.Safety.{Gate, LivenessMonitor, Readiness}
   alias Robot.Mission.Manual
   alias Nav.{Grid, Reach}
@@ -85,9 +86,15 @@ defmodule Swarm.Comms.CommandHandler do
     do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
 
   defp judge(:sonar, config, board, {_receiver, at_ms}) do
-    case Board.fetch(board, :sonar, @recent_ms, at_ms) do
-      {:ok, ranges, _age_ms} -> {:ok, Enum.zip(config.profile.sonars, ranges)}
-      _old_or_none -> {:error, "#{config.id}: its sonars say nothing"}
+    recent = fn key, _limit_ms -> Board.fetch(board, key, @recent_ms, at_ms) end
+
+    case Snapshot.ranges(config.profile, recent) do
+      {_body, nil} ->
+        {:error, "#{config.id}: its sonars say nothing"}
+
+      {body, ranges} ->
+        {:ok,
+         for({_pose, range} = heard <- Enum.zip(body.sonars, ranges), range != nil, do: heard)}
     end
   end
 

@@ -10,7 +10,7 @@ defmodule Swarm.Discovery.RobotInfo do
   | `battery` | volts, `nil` if it is not measured |
   | `calibrated` | `true` unless `say/2` says otherwise |
   | `mission`, `state` | what it is doing, such as `:landmark` and `:follow`, or `nil` and `:idle` |
-  | `services` | what it has: `:drive`, `:camera`, `:ptz`, the responders that run on it (roles `{:service, name}` of `Robot.Names`), and those from `say/2` |
+  | `services` | what it has: `:drive`, `:camera`, `:ptz`, `:scan` (a lidar), the responders that run on it (roles `{:service, name}` of `Robot.Names`), and those from `say/2` |
   | `node`, `age_ms` | its node; the age of the row |
 
   `say/2`, on the robot's node, adds what only others know about a robot.
@@ -120,7 +120,9 @@ defmodule Swarm.Discovery.RobotInfo do
   end
 
   defp devices(config) do
-    for device <- [:drive, :camera, :ptz], Map.get(config, device), do: Atom.to_string(device)
+    for device <- [:drive, :camera, :ptz, :scan],
+        Map.get(config, device),
+        do: Atom.to_string(device)
   end
 
   defp offered(robot) do

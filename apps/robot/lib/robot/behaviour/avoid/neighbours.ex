@@ -71,8 +71,12 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
           abs(Pose.bearing(from, at)) < profile.sonar_cone / 2,
           do: range > distance - radius + @beyond
 
-    match?([_, _ | _], echoes) and Enum.all?(echoes)
+    enough?(profile, echoes) and Enum.all?(echoes)
   end
+
+  # A beam of a lidar has many rays, and lies beside the next one.
+  defp enough?(%{scan: nil}, echoes), do: match?([_, _ | _], echoes)
+  defp enough?(_lidar, echoes), do: echoes != []
 
   @doc """
   Replaces the place of each standing robot by the mean of its recent reports, because reported

@@ -1,11 +1,11 @@
 defmodule Robot.Safety.Reflex.Body do
   @moduledoc """
-  Computes how fast a body may move near what its sonars see. Pure; points in `base_link`.
+  Computes how fast a body may move near what its sonars and its lidar see. Pure; points in `base_link`.
 
   For driving, every body counts as the circle round its corners; for turning, a body longer than
   wide counts as a box, whose corners may swing into something.
   """
-  alias Hal.Profile
+  alias Hal.{Pose, Profile, Scan}
 
   @type point :: {x :: float(), y :: float()}
 
@@ -43,8 +43,7 @@ defmodule Robot.Safety.Reflex.Body do
 
   defp points([pose | poses], [range | ranges], profile)
        when is_number(range) and range >= 0 and range < profile.sonar_max do
-    # At the sonar's minimum range, the obstacle may be anywhere nearer.
-    range = if range <= profile.sonar_min + @unmeasured, do: min(range, @touching), else: range
+    range = touched(range, profile.sonar_min)
     x = pose.x + range * :math.cos(pose.heading)
     y = pose.y + range * :math.sin(pose.heading)
     [{x, y} | points(poses, ranges, profile)]
@@ -52,6 +51,35 @@ defmodule Robot.Safety.Reflex.Body do
 
   defp points([_ | poses], [_ | ranges], profile), do: points(poses, ranges, profile)
   defp points(_, _, _profile), do: []
+
+  # At the least range, the obstacle may be anywhere nearer.
+  defp touched(range, least),
+    do: if(range <= least + @unmeasured, do: min(range, @touching), else: range)
+
+  @doc """
+  The points that a lidar sees, as far as they may slow the body down.
+
+      iex> body = %{Hal.Profile.magellan() | scan: Hal.Profile.scan()}
+      iex> scan = %Hal.Scan{start: 0.0, step: 0.1, ranges: <<600::16, 0::16, 9000::16, 100::16>>}
+      iex> for {x, y} <- Robot.Safety.Reflex.Body.scanned(body, scan), do: {Float.round(x, 3), Float.round(y, 3)}
+      [{0.6, 0.0}, {0.048, 0.015}]
+  """
+  @spec scanned(Profile.t(), Scan.t()) :: [point()]
+  def scanned(%Profile{scan: %{pose: mount} = lidar} = profile, %Scan{} = scan) do
+    most = horizon(profile) + Pose.distance(Pose.new(0, 0), Pose.point(mount))
+
+    for {direction, range} <- Scan.echoes(scan, min(most, lidar.max)) do
+      range = touched(range, lidar.min)
+      angle = mount.heading + direction
+      {mount.x + range * :math.cos(angle), mount.y + range * :math.sin(angle)}
+    end
+  end
+
+  # What is farther away (metres) slows down nothing at full speed.
+  defp horizon(%Profile{max_linear: speed, max_acceleration: braking, radius: radius} = profile) do
+    way = speed * (@reaction_s + profile.sonar_round_s) + speed * speed / (2 * braking)
+    radius + @side + @clearance + max(way, @beside_from)
+  end
 
   @doc """
   The greatest speed (m/s) in the direction of `linear` from which the body can stop before the

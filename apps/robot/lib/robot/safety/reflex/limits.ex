@@ -11,6 +11,8 @@ defmodule Robot.Safety.Reflex.Limits do
 
   @blind_ms 500
   @blind_speed 0.1
+  # A lidar is a device of its own: while it is as silent as that, nothing else stops the wheels.
+  @unseen_ms 2_000
   # A place that is older than this counts as unknown.
   @lost_ms 500
   # The time step of the ramp is never longer than this, even if the clock jumped.
@@ -47,25 +49,35 @@ defmodule Robot.Safety.Reflex.Limits do
 
   defp near(linear, reflex, at_ms, limits) do
     if blind?(reflex, at_ms) do
-      lower(linear, @blind_speed, :blind, limits)
+      lower(linear, blind_speed(reflex, at_ms), :blind, limits)
     else
-      %{profile: profile, sonar: points} = reflex
+      points = reflex.scan ++ reflex.sonar
+      profile = reflex.profile
       {linear, limits} = lower(linear, Body.free_speed(profile, points, linear), :near, limits)
       lower(linear, Body.passing_speed(profile, points, linear), :beside, limits)
     end
   end
 
-  defp blind?(%{profile: %{sonars: []}}, _at_ms), do: false
-  defp blind?(%{sonar_at_ms: nil}, _at_ms), do: true
-  defp blind?(%{sonar_at_ms: sonar_at_ms}, at_ms), do: at_ms - sonar_at_ms > @blind_ms
+  defp blind?(%{profile: profile} = reflex, at_ms) do
+    (profile.sonars != [] and older?(reflex.sonar_at_ms, @blind_ms, at_ms)) or
+      (profile.scan != nil and older?(reflex.scan_at_ms, @blind_ms, at_ms))
+  end
+
+  defp blind_speed(%{profile: %{scan: nil}}, _at_ms), do: @blind_speed
+
+  defp blind_speed(%{scan_at_ms: scan_at_ms}, at_ms),
+    do: if(older?(scan_at_ms, @unseen_ms, at_ms), do: 0.0, else: @blind_speed)
+
+  defp older?(nil, _most_ms, _at_ms), do: true
+  defp older?(then_ms, most_ms, at_ms), do: at_ms - then_ms > most_ms
 
   # What was seen last still counts, but not as all that there is.
   defp corner(turn, reflex, at_ms, limits) do
-    free = Body.free_turn(reflex.profile, reflex.sonar, turn)
+    free = Body.free_turn(reflex.profile, reflex.scan ++ reflex.sonar, turn)
     {turn, limits} = lower(turn, free, :corner, limits)
 
     if blind?(reflex, at_ms),
-      do: lower(turn, Body.turn_at(reflex.profile, @blind_speed), :blind, limits),
+      do: lower(turn, Body.turn_at(reflex.profile, blind_speed(reflex, at_ms)), :blind, limits),
       else: {turn, limits}
   end
 
