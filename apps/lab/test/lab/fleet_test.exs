@@ -44,6 +44,35 @@ defmodule Lab.FleetTest do
     eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
+  test "a robot with a lidar goes by its scans, tells what it hears, and stands while they do not come" do
+    fleet = fleet(%{robots: [:burger71], landmark: :none, mission: false})
+    eventually(fn -> match?({:ok, [_ | _]}, Swarm.sonar(:burger71)) end)
+    {:ok, heard} = Swarm.sonar(:burger71)
+    assert Enum.all?(heard, fn {%Pose{x: x}, range} -> x == -0.032 and range <= 3.5 end)
+    {:ok, board} = Board.find(:burger71)
+    assert {:ok, %Hal.Scan{}, _at_ms} = Board.fetch(board, :scan, 1_000)
+    assert {:online, _since_ms} = Board.health(board, :scan)
+
+    start = truth(fleet, :burger71)
+    assert order(fn -> Swarm.goto(:burger71, Pose.place(start, {0.5, 0.0})) end) == :ok
+    eventually(fn -> Swarm.status(:burger71).state == :done end)
+    assert Pose.distance(truth(fleet, :burger71), Pose.point(start)) > 0.3
+
+    lidar = Names.whereis(:burger71, :scan)
+    :ok = :sys.suspend(lidar)
+    assert order(fn -> Swarm.goto(:burger71, Pose.point(start)) end) == :ok
+
+    eventually(fn ->
+      {:ok, driving, _at_ms} = Board.fetch(board, :driving, 1_000)
+      :blind in driving.limits and driving.twist.linear == 0.0
+    end)
+
+    :ok = :sys.resume(lidar)
+    eventually(fn -> Swarm.status(:burger71).state == :done end)
+    assert Fleet.result(fleet).collisions == 0
+    stop(fleet)
+  end
+
   defmodule Failing do
     @moduledoc "A mission that fails in its first ticks."
     @behaviour Robot.Mission

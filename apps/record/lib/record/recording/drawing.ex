@@ -17,12 +17,13 @@ defmodule Record.Recording.Drawing do
   @other {0.50, 0.50, 0.50, 0.6}
   @dead {0.20, 0.20, 0.20, 0.6}
   @seen {0.95, 0.85, 0.10, 0.7}
+  @heard {0.85, 0.25, 0.20, 1}
   @goal {0.20, 0.70, 0.30, 0.5}
   @box {1, 1, 1}
 
   @doc """
   The scene of a robot that knows its pose: its body, the circle in which it is in 95 of 100 cases,
-  the other robots, the blobs whose distance it knows, and the pose to which its goal leads, if any.
+  the other robots, the blobs whose distance it knows, the ends of the beams of its lidar, and the pose to which its goal leads, if any.
   """
   @spec scene(non_neg_integer(), Percept.t(), words :: String.t(), Pose.t() | nil) :: iodata()
   def scene(ns, %Percept{pose: %Pose{}} = percept, words, goal) do
@@ -36,6 +37,7 @@ defmodule Record.Recording.Drawing do
           do: entity(ns, "#{peer}", peer(peer, heard))
         ) ++
         for({place, blob, n} <- seen(percept), do: entity(ns, "seen #{n}", seen(place, blob))) ++
+        heard(ns, percept) ++
         for(%Pose{} = goal <- [goal], do: entity(ns, "goal", goal(goal)))
 
     Foxglove.scene_update(entities, [Scene.delete_all(ns)])
@@ -76,6 +78,20 @@ defmodule Record.Recording.Drawing do
     colour = if mode == :dead, do: @dead, else: @other
     body(place(heard.pose), heard.radius, "#{id} #{mode}", colour)
   end
+
+  # The ends of the beams of its lidar.
+  defp heard(ns, %{profile: %{scan: scan, sonars: beams}, sonar: [_ | _] = ranges, pose: pose})
+       when scan != nil do
+    spots =
+      for {beam, range} when is_number(range) and range < scan.max <- Enum.zip(beams, ranges) do
+        %Pose{x: x, y: y} = pose |> Pose.compose(beam) |> Pose.compose(Pose.new(range, 0))
+        Scene.sphere({{x, y, @height}, 0}, {0.05, 0.05, 0.05}, @heard)
+      end
+
+    [entity(ns, "heard", spots)]
+  end
+
+  defp heard(_ns, _percept), do: []
 
   defp seen(%{detections: nil}), do: []
 

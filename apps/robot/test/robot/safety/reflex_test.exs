@@ -329,7 +329,7 @@ defmodule Robot.Safety.ReflexTest do
         at_ms = at_ms + Enum.random([10, 50, 50, 50, 130, 400])
 
         wishes =
-          for by <- [:a, :b], do: %Wish{by: by, weight: :rand.uniform(), twist: twist(numbers)}
+          for by <- [:a, :b], do: %Wish{by: by, weight: :rand.uniform(), twist: drawn(numbers)}
 
         before = reflex.twist
 
@@ -366,7 +366,7 @@ defmodule Robot.Safety.ReflexTest do
     end
   end
 
-  defp twist(numbers), do: %Twist{linear: Enum.random(numbers), turn: Enum.random(numbers)}
+  defp drawn(numbers), do: %Twist{linear: Enum.random(numbers), turn: Enum.random(numbers)}
 
   defp reading(profile) do
     Enum.random([
