@@ -3,6 +3,7 @@
 # libcreate's data.cpp (wheel base); iRobot's data sheet (size, mass). The greatest turn is that of both wheels at 0.5 m/s.
 [
   about: "an iRobot Create 2",
+  board: :create,
   mass: 3.6,
   radius: 0.17,
   height: 0.092,

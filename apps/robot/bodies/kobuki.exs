@@ -3,6 +3,7 @@
 # (size, mass); kobuki_core's diff_drive.cpp (accelerations, beyond which it lifts its front).
 [
   about: "a Kobuki",
+  board: :kobuki,
   mass: 2.35,
   radius: 0.176,
   height: 0.125,

@@ -4,6 +4,7 @@
 # height); the Raspberry Pi's camera module 2 (field of view); LDS-01's sheet (ranges, turns), the same urdf (its place).
 [
   about: "a TurtleBot3 Burger",
+  board: :turtlebot3_burger,
   mass: 1.0,
   length: 0.138,
   width: 0.178,
@@ -17,7 +18,8 @@
     rays: 360,
     min: 0.12,
     max: 3.5,
-    period: 0.2
+    period: 0.2,
+    model: :lds01
   ],
   # It is fixed, and looks ahead. body: [camera: nil] for one without.
   camera: [

@@ -4,6 +4,7 @@
 # camera module 2 (field of view); LDS-01's sheet (ranges, turns), the same urdf (its place).
 [
   about: "a TurtleBot3 Waffle Pi",
+  board: :turtlebot3_waffle,
   mass: 1.8,
   length: 0.281,
   width: 0.306,
@@ -17,7 +18,8 @@
     rays: 360,
     min: 0.12,
     max: 3.5,
-    period: 0.2
+    period: 0.2,
+    model: :lds01
   ],
   # It is fixed, and looks ahead.
   camera: [

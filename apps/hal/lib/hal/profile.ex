@@ -18,7 +18,8 @@ defmodule Hal.Profile do
   `scan` is a lidar: its pose, how many rays it has in a turn, how wide it sees (radians, in the middle of which is the heading
   of its pose), its least and greatest range (metres), and the time of a turn (s); `nil` for a body without one (`Hal.Scan`).
   `camera` is `nil` for a body without one. `about` is what people call it, `mass` is in kg; `nil` if that is not known.
-  `rflex` says whose published wiring and conversions an rFLEX controller in it has, `nil` for none.
+  `rflex` says whose published wiring and conversions an rFLEX controller in it has, `nil` for none; `board` which other controller
+  with a driver and an emulator of ours is in it, if any. `model` of a `scan` says the same of the lidar.
   """
   alias Hal.Pose
 
@@ -41,7 +42,8 @@ defmodule Hal.Profile do
     field_of_view: 2 * :math.pi(),
     min: 0.15,
     max: 12.0,
-    period: 0.1
+    period: 0.1,
+    model: nil
   }
 
   @enforce_keys [:name, :radius, :length, :width, :wheel_base, :max_linear, :max_turn, :sonars]
@@ -54,6 +56,7 @@ defmodule Hal.Profile do
                 about: nil,
                 mass: nil,
                 rflex: nil,
+                board: nil,
                 sonar_min: 0.15,
                 sonar_max: 5.1,
                 sonar_cone: :math.pi() / 6,
@@ -66,13 +69,16 @@ defmodule Hal.Profile do
                 camera: @camera
               ]
 
+  @type board :: :kobuki | :create | :turtlebot3_burger | :turtlebot3_waffle | :arduino
+
   @type scan :: %{
           pose: Pose.t(),
           rays: pos_integer(),
           field_of_view: float(),
           min: float(),
           max: float(),
-          period: float()
+          period: float(),
+          model: :lds01 | :lds02 | :rplidar | nil
         }
 
   @type t :: %__MODULE__{
@@ -85,6 +91,7 @@ defmodule Hal.Profile do
           about: String.t() | nil,
           mass: float() | nil,
           rflex: :magellan | :atrv_mini | nil,
+          board: board() | nil,
           wheel_base: float(),
           max_linear: float(),
           max_turn: float(),

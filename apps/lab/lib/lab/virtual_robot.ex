@@ -132,7 +132,7 @@ defmodule Lab.VirtualRobot do
         trace: trace(common.trace, id)
       ] ++
         camera(robot.profile, device, common) ++
-        scan(robot.profile, device) ++ drivers(robot, device, common.folder)
+        scan(robot, device, common.folder) ++ drivers(robot, device, common.folder)
     )
   end
 
@@ -141,8 +141,13 @@ defmodule Lab.VirtualRobot do
   defp camera(_profile, device, common),
     do: [camera: {Sim.Device.Camera, device ++ [blobs: common.blobs, clock: common.clock]}]
 
-  defp scan(%{scan: nil}, _device), do: []
-  defp scan(_profile, device), do: [scan: {Sim.Device.Scan, device}]
+  defp scan(%{profile: %{scan: nil}}, _device, _folder), do: []
+
+  defp scan(%{hardware?: true, profile: %{scan: %{model: model}}} = robot, _device, folder)
+       when model != nil,
+       do: Hardware.scan(robot, folder)
+
+  defp scan(_simulated, device, _folder), do: [scan: {Sim.Device.Scan, device}]
 
   defp drivers(%{hardware?: true} = robot, _device, folder), do: Hardware.drivers(robot, folder)
 

@@ -174,9 +174,9 @@ defmodule Lab.Trial.Options do
       ids != Enum.uniq(ids) or ids -- robots != [] ->
         refuse(:hardware, ids, "a list of robots of this run, [:mag1],")
 
-      id = Enum.find(ids, &(bodies[&1].rflex == nil)) ->
+      id = Enum.find(ids, &(bodies[&1].rflex == nil and bodies[&1].board == nil)) ->
         {:error,
-         "#{id} cannot be hardware: only bodies with an rFLEX controller are emulated on serial lines, mag and min"}
+         "#{id} cannot be hardware: its body names no controller that is emulated on a serial line (rflex or board)"}
 
       true ->
         :ok

@@ -1,13 +1,14 @@
 defmodule Lab.VirtualRobot.Hardware do
   @moduledoc """
-  Gives robots of a simulated fleet whose bodies have an rFLEX controller (`rflex` of `Hal.Profile`) the drivers of real
-  ones: each has a base and a camera, emulated on pseudo-terminals whose links are in the run's folder (`mag1.base`, `mag1.camera`), with the robot's body in the world behind them.
+  Gives robots of a simulated fleet whose bodies name a controller (`rflex` or `board` of `Hal.Profile`) the drivers of real
+  ones: each has a base, a head if its camera turns, and its lidar, emulated on pseudo-terminals whose links are in the run's folder
+  (`mag1.base`, `mag1.camera`, `burger1.scan`), with the robot's body in the world behind them.
 
       supervisor (one_for_one: a device that crashes was, in effect, switched off and on)
-      `-- Sim.Emulator   two for each such robot
+      `-- Sim.Emulator   one to three for each such robot
   """
   alias Sim.{Device, Emulator}
-  alias Sim.Emulator.{RFlexController, ViscaCamera}
+  alias Sim.Emulator.{Lds, RFlexController, RPLidar, ViscaCamera}
 
   # Only our own bugs crash a device; the others go on.
   @restarts 100
@@ -42,23 +43,44 @@ defmodule Lab.VirtualRobot.Hardware do
 
   defp devices(%{id: id, profile: profile} = robot, world, folder) do
     body = [world: world, robot: id]
-    base = [kind: profile.rflex, sonar_max: profile.sonar_max, ir_max: profile.ir_max]
+    base = emulator({id, :base}, base(profile), link(folder, robot, "base"), {Device.Drive, body})
 
-    [
-      emulator(
-        {id, :base},
-        {RFlexController, base},
-        base_link(folder, robot),
-        {Device.Drive, body}
-      ),
-      emulator(
-        {id, :camera},
-        {ViscaCamera, lens: lens(profile)},
-        camera_link(folder, robot),
-        {Device.Ptz, body}
-      )
-    ]
+    head =
+      if head?(profile),
+        do: [
+          emulator(
+            {id, :camera},
+            {ViscaCamera, lens: lens(profile)},
+            link(folder, robot, "camera"),
+            {Device.Ptz, body}
+          )
+        ],
+        else: []
+
+    [base | head] ++ lidars(robot, body, folder)
   end
+
+  defp lidars(%{id: id, profile: %{scan: %{model: model}}} = robot, body, folder)
+       when model != nil do
+    core = if model == :rplidar, do: {RPLidar, []}, else: {Lds, model: model}
+    [emulator({id, :scan}, core, link(folder, robot, "scan"), {Device.Scan, body})]
+  end
+
+  defp lidars(_robot, _body, _folder), do: []
+
+  # Its emulator.
+  defp base(%{rflex: rflex} = profile) when rflex != nil,
+    do: {RFlexController, kind: rflex, sonar_max: profile.sonar_max, ir_max: profile.ir_max}
+
+  defp base(%{board: :kobuki}), do: {Emulator.Kobuki, []}
+  defp base(%{board: :create}), do: {Emulator.Create, []}
+  defp base(%{board: :turtlebot3_burger}), do: {Emulator.TurtleBot3, model: :burger}
+  defp base(%{board: :turtlebot3_waffle}), do: {Emulator.TurtleBot3, model: :waffle}
+  defp base(%{board: :arduino}), do: {Emulator.Arduino, []}
+
+  # A camera that turns.
+  defp head?(%{camera: nil}), do: false
+  defp head?(%{camera: camera}), do: camera.max_pan > 0 or camera.max_tilt > 0
 
   defp emulator(id, core, link, body) do
     %{id: id, start: {Emulator, :start_link, [[core: core, link: link, body: body]]}}
@@ -70,31 +92,55 @@ defmodule Lab.VirtualRobot.Hardware do
   """
   @spec drivers(robot(), Path.t()) :: keyword()
   def drivers(%{profile: profile} = robot, folder) do
+    {driver, options} = driver(profile)
+    port = link(folder, robot, "base")
+
+    head =
+      if head?(profile),
+        do: [ptz: {Hal.Visca.Driver, port: link(folder, robot, "camera"), lens: lens(profile)}],
+        else: []
+
     [
-      drive:
-        {Hal.RFlex.Driver,
-         [port: base_link(folder, robot), profile: profile] ++ base(profile.rflex)},
-      ptz: {Hal.Visca.Driver, port: camera_link(folder, robot), lens: lens(profile)},
+      drive: {driver, [port: port, profile: profile] ++ options},
       departure_file: Path.join(folder, "#{robot.id}.departed")
-    ]
+    ] ++ head
+  end
+
+  defp driver(%{rflex: rflex}) when rflex != nil, do: {Hal.RFlex.Driver, conversions(rflex)}
+  defp driver(%{board: :kobuki}), do: {Hal.Kobuki.Driver, []}
+  defp driver(%{board: :create}), do: {Hal.Create.Driver, []}
+  defp driver(%{board: :turtlebot3_burger}), do: {Hal.TurtleBot3.Driver, model: :burger}
+  defp driver(%{board: :turtlebot3_waffle}), do: {Hal.TurtleBot3.Driver, model: :waffle}
+  defp driver(%{board: :arduino}), do: {Hal.Arduino.Driver, []}
+
+  @doc "The driver of such a robot's lidar."
+  @spec scan(robot(), Path.t()) :: keyword()
+  def scan(%{profile: %{scan: %{model: model}}} = robot, folder) do
+    port = [port: link(folder, robot, "scan")]
+
+    if model == :rplidar,
+      do: [scan: {Hal.RPLidar.Driver, port}],
+      else: [scan: {Hal.Lds.Driver, port ++ [model: model]}]
   end
 
   @doc "Where their serial lines are, for people, one line per robot."
   @spec lines([robot()], Path.t()) :: [String.t()]
   def lines(robots, folder) do
-    for %{hardware?: true} = robot <- robots do
-      "#{robot.id} has real drivers: its base on #{base_link(folder, robot)}, its camera's head on " <>
-        camera_link(folder, robot)
+    for %{hardware?: true, profile: profile} = robot <- robots do
+      head = if head?(profile), do: ", its camera's head on #{link(folder, robot, "camera")}"
+      model = with %{model: model} <- profile.scan, do: model
+      lidar = if model, do: ", its lidar on #{link(folder, robot, "scan")}"
+      "#{robot.id} has real drivers: its base on #{link(folder, robot, "base")}#{head}#{lidar}"
     end
   end
 
   # From the fact sheet, as in the file of such a robot.
-  defp base(:magellan),
+  defp conversions(:magellan),
     do: [
       conversions: [distance: 31_387.0, angle: 4654.2, range: 1474.0, ir_a: 4000.0, ir_b: -2.0]
     ]
 
-  defp base(:atrv_mini) do
+  defp conversions(:atrv_mini) do
     [
       conversions: [distance: 190_000.0, angle: 60_000.0, range: 1476.0],
       bumpers: [count: 0],
@@ -105,6 +151,5 @@ defmodule Lab.VirtualRobot.Hardware do
   # The field of view of the pictures is that of the profile as long as the camera does not zoom.
   defp lens(%{camera: %{field_of_view: wide}}), do: {wide / 11, wide}
 
-  defp base_link(folder, %{id: id}), do: Path.join(folder, "#{id}.base")
-  defp camera_link(folder, %{id: id}), do: Path.join(folder, "#{id}.camera")
+  defp link(folder, %{id: id}, what), do: Path.join(folder, "#{id}.#{what}")
 end

@@ -52,6 +52,31 @@ defmodule Lab.Hardware.FleetTest do
     refute File.exists?(folder)
   end
 
+  test "so does a Burger with its lidar, a Create 2 and a Kobuki, each by its own driver" do
+    robots = [:burger1, :create2_1, :kobuki1]
+
+    {:ok, fleet} =
+      Fleet.start_link(robots: robots, hardware: robots, landmark: :none, mission: false)
+
+    assert Enum.any?(Fleet.lines(fleet), &(&1 =~ ~r"burger1 has real drivers: .*burger1\.scan"))
+
+    for id <- robots do
+      eventually(fn -> match?(%Swarm.Status{pose: %Pose{}, arming: :armed}, Swarm.status(id)) end)
+      start = World.truth(Fleet.moment(fleet).world, id)
+      place = Pose.place(start, {0.5, 0.1})
+      assert order(fn -> Swarm.goto(id, place) end) == :ok
+      eventually(fn -> Swarm.status(id).state == :done end)
+
+      eventually(fn ->
+        Pose.distance(World.truth(Fleet.moment(fleet).world, id), place) < 0.15
+      end)
+    end
+
+    assert {:ok, %Hal.Scan{}, _at_ms} = Board.fetch(Board.find!(:burger1), :scan, 1_000)
+    assert Fleet.result(fleet).collisions == 0
+    Fleet.stop(fleet)
+  end
+
   test "lockstep has no serial lines, and only a fleet's robots can be hardware" do
     assert {:error, line} = Trial.new(%{robots: [:mag1], hardware: [:mag1]})
     assert line =~ "mag1"

@@ -21,6 +21,8 @@ defmodule Robot.File.Body do
     {:keys,
      about: {:text, "what people call it, such as \"a TurtleBot3 Burger\","},
      mass: {:number, 0.1, 1_000.0, "kg"},
+     board:
+       {:or, nil, {:one_of, [:kobuki, :create, :turtlebot3_burger, :turtlebot3_waffle, :arduino]}},
      radius: {:number, 0.05, 1.5, "m"},
      length: {:number, 0.1, 2.0, "m"},
      width: {:number, 0.1, 2.0, "m"},
@@ -47,7 +49,8 @@ defmodule Robot.File.Body do
       field_of_view: {:number, 0.1, 2 * :math.pi(), "rad"},
       min: {:number, 0.0, 1.0, "m"},
       max: {:number, 0.5, 60.0, "m"},
-      period: {:number, 0.01, 1.0, "s"}
+      period: {:number, 0.01, 1.0, "s"},
+      model: {:or, nil, {:one_of, [:lds01, :lds02, :rplidar]}}
     ]
   end
 
