@@ -97,7 +97,7 @@ double sim_wall(const sim_map *map, double x, double y, double rx, double ry, do
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges);
 
-/* The ranges of a robot's lidar, two bytes each, the higher first: millimetres, 0 for nothing. */
+/* The ranges of a robot's lidar, two bytes each, the higher first: millimetres, 65535 for nothing. */
 void sim_scan(const sim_map *map, const sim_disc *discs, size_t count, const sim_lidar *lidar,
               const sim_noise *noise, sim_disc *near, uint8_t *ranges);
 

@@ -148,27 +148,46 @@ static int sane(const double *values, size_t count, double most)
     return 1;
 }
 
+/* The discs of a binary, to be freed, with room for as many behind them. */
+static sim_disc *get_discs(ErlNifEnv *env, ERL_NIF_TERM term, size_t *count)
+{
+    ErlNifBinary packed;
+
+    *count = 0;
+    if (!enif_inspect_binary(env, term, &packed) || packed.size % sizeof(sim_disc) != 0 ||
+        packed.size / sizeof(sim_disc) > MOST_BODIES)
+        return NULL;
+    sim_disc *discs = enif_alloc(2 * packed.size + sizeof(sim_disc));
+    if (discs == NULL)
+        return NULL;
+    memcpy(discs, packed.data, packed.size);
+    *count = packed.size / sizeof(sim_disc);
+    if (sane((double *)discs, 3 * *count, WORLD))
+        return discs;
+    release(discs);
+    return NULL;
+}
+
 /* sonar(map, discs, rings, noise) */
 static ERL_NIF_TERM sonar(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
     sim_map map;
     sim_noise noise;
-    ErlNifBinary packed, geometry;
+    ErlNifBinary geometry;
     ERL_NIF_TERM head, tail, rows, result = 0;
     int fine = 1;
     double directions[64 * SIM_SENSOR], ranges[64];
     ERL_NIF_TERM terms[64];
 
-    if (argc != 4 || !get_map(env, argv[0], &map) || !enif_inspect_binary(env, argv[1], &packed) ||
-        packed.size % sizeof(sim_disc) != 0 || packed.size / sizeof(sim_disc) > MOST_BODIES ||
-        !get_noise(env, argv[3], &noise))
+    if (argc != 4 || !get_map(env, argv[0], &map) || !get_noise(env, argv[3], &noise))
         return enif_make_badarg(env);
 
-    size_t count = packed.size / sizeof(sim_disc);
-    sim_disc *discs = (sim_disc *)doubles(&packed);
-    sim_disc *near = enif_alloc((count + 1) * sizeof(sim_disc));
+    size_t count;
+    sim_disc *discs = get_discs(env, argv[1], &count);
 
-    if (discs != NULL && near != NULL && sane((double *)discs, 3 * count, WORLD)) {
+    if (discs != NULL) {
+        sim_disc *near = discs + count;
+
         rows = enif_make_list(env, 0);
         for (tail = argv[2]; fine && enif_get_list_cell(env, tail, &head, &tail);) {
             sim_ring ring;
@@ -190,7 +209,6 @@ static ERL_NIF_TERM sonar(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
             enif_make_reverse_list(env, rows, &result);
     }
     release(discs);
-    release(near);
     return answer(env, result);
 }
 
@@ -221,20 +239,18 @@ static ERL_NIF_TERM scan(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
     sim_map map;
     sim_noise noise;
-    ErlNifBinary packed;
     ERL_NIF_TERM head, tail, row, rows, result = 0;
     int fine = 1;
 
-    if (argc != 4 || !get_map(env, argv[0], &map) || !enif_inspect_binary(env, argv[1], &packed) ||
-        packed.size % sizeof(sim_disc) != 0 || packed.size / sizeof(sim_disc) > MOST_BODIES ||
-        !get_noise(env, argv[3], &noise))
+    if (argc != 4 || !get_map(env, argv[0], &map) || !get_noise(env, argv[3], &noise))
         return enif_make_badarg(env);
 
-    size_t count = packed.size / sizeof(sim_disc);
-    sim_disc *discs = (sim_disc *)doubles(&packed);
-    sim_disc *near = enif_alloc((count + 1) * sizeof(sim_disc));
+    size_t count;
+    sim_disc *discs = get_discs(env, argv[1], &count);
 
-    if (discs != NULL && near != NULL && sane((double *)discs, 3 * count, WORLD)) {
+    if (discs != NULL) {
+        sim_disc *near = discs + count;
+
         rows = enif_make_list(env, 0);
         for (tail = argv[2]; fine && enif_get_list_cell(env, tail, &head, &tail);) {
             sim_lidar lidar;
@@ -250,7 +266,6 @@ static ERL_NIF_TERM scan(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
             enif_make_reverse_list(env, rows, &result);
     }
     release(discs);
-    release(near);
     return answer(env, result);
 }
 

@@ -195,21 +195,23 @@ void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const si
     }
 }
 
-/* A range with noise, in millimetres; 0 for a ray that is lost, or ends nearer or farther than the lidar measures. */
+enum { SILENT = 65535 };
+
+/* A range with noise, in millimetres; SILENT for a ray without an answer: lost, or from nearer or farther than the lidar measures. */
 static uint32_t measured(const sim_lidar *lidar, const sim_noise *noise, size_t k, double range)
 {
     if (range >= lidar->most)
-        return 0;
+        return SILENT;
     if (noise->on) {
         uint32_t self = (uint32_t)lidar->self;
         uint32_t hash = sim_hash(noise->seed, noise->step, self, 0x10000u + (uint32_t)k);
         double sd = 0.007 * range;
         if (mix(hash) < 85899345u)
-            return 0;
+            return SILENT;
         range = range + (sd < 0.003 ? 0.003 : sd) * sim_gauss(hash);
     }
     if (range < lidar->least || range > lidar->most)
-        return 0;
+        return SILENT;
     return (uint32_t)(range * 1000.0 + 0.5);
 }
 

@@ -3,9 +3,10 @@ defmodule Hal.Scan do
   Holds a turn of a lidar: how far it is in many directions. Pure. Metres and radians, seen from the lidar; where that is on
   the body, and between which ranges it measures, says the body's `scan:` (`Hal.Profile`).
 
-  Ray `i` looks in direction `start + i * step`, left positive. `ranges` has two bytes a ray, big-endian: millimetres, 0 for a
-  ray that measured nothing, so that there may be anything, and 65535 for one that surely found nothing in its reach. Most
-  lidars do not tell these two apart, and give 0 for both.
+  Ray `i` looks in direction `start + i * step`, left positive. `ranges` has two bytes a ray, big-endian: millimetres, 65535 for a
+  ray without an answer, and 0 for one that was not measured. No answer comes from what is farther than a lidar reaches, and from
+  what is nearer than it measures, black, or slanted; no lidar of ours tells these apart. As with sonars, it shows nothing that
+  is in the way, and maps take it for a sign of free space, a weak one.
 
   What is written for sonars serves lidars, too: `beams/2` makes of a scan the nearest range in each of some cones of 10
   degrees, and `ring/1` the body that has these in the place of its sonars. A percept has both (`Robot.Percept.Snapshot`);
@@ -23,12 +24,12 @@ defmodule Hal.Scan do
   @most 36
   @silent 65_535
 
-  @doc "What a ray has in millimetres that surely found nothing."
+  @doc "What a ray without an answer has for millimetres."
   @spec silent() :: 65_535
   def silent, do: @silent
 
   @doc """
-  A range in metres (a number; `nil` for a ray that measured nothing, `:silent` for one that found nothing) as a scan has it.
+  A range in metres (a number; `nil` for a ray that was not measured, `:silent` for one without an answer) as a scan has it.
 
       iex> for range <- [1.2344, nil, :silent, 99.0], do: Hal.Scan.pack(range)
       [<<1234::16>>, <<0::16>>, <<65535::16>>, <<65535::16>>]
@@ -100,7 +101,7 @@ defmodule Hal.Scan do
 
   @doc """
   The nearest range in each beam of a lidar, from the right to the left of what it sees; `scan` is that of the body. The
-  greatest range where nothing surely is, `nil` where nothing was measured.
+  greatest range where no ray was answered, `nil` where none was measured.
 
       iex> scan = %{Hal.Profile.scan() | field_of_view: :math.pi() / 9, max: 4.0}
       iex> rays = fn list -> %Hal.Scan{start: -0.16, step: 0.08, ranges: for(mm <- list, into: <<>>, do: <<mm::16>>)} end

@@ -71,7 +71,7 @@ defmodule Sim.Compute do
   defp sonar(module, map, discs, rings, noise), do: module.sonar_few(map, discs, rings, noise)
 
   @doc """
-  What all lidars measure, as `Hal.Scan` has it: 0 for a ray that meets nothing in its reach. Noise is N(0, 0.7 %), at least of
+  What all lidars measure, as `Hal.Scan` has it: a ray that meets nothing in its reach is silent. Noise is N(0, 0.7 %), at least of
   3 mm, and one ray in fifty is lost; drawn by robot and ray.
   """
   @spec scan(Sim.Floorplan.t(), [disc()], [lidar()], noise()) :: [binary()]

@@ -5,15 +5,17 @@ defmodule Hal.Lidar.Turn do
   """
   alias Hal.Scan
 
-  @typedoc "The direction from the lidar, radians, left positive, and millimetres; 0 if nothing was measured."
+  @silent Scan.silent()
+
+  @typedoc "The direction from the lidar, radians, left positive, and millimetres; 0 without an answer."
   @type measured :: {float(), 0..65_535}
 
   @doc """
   The scan of these measurements, in any order, with so many rays.
 
-      iex> scan = Hal.Lidar.Turn.scan([{0.1, 900}, {-0.1, 800}, {0.05, 0}, {1.6, 700}], 4)
+      iex> scan = Hal.Lidar.Turn.scan([{0.1, 900}, {-0.1, 800}, {0.05, 0}, {1.6, 0}], 4)
       iex> for <<mm::16 <- scan.ranges>>, do: mm
-      [0, 0, 800, 700]
+      [0, 0, 800, 65535]
       iex> scan.start + 2 * scan.step
       0.0
   """
@@ -22,9 +24,10 @@ defmodule Hal.Lidar.Turn do
     step = 2 * :math.pi() / rays
 
     nearest =
-      for {angle, mm} when mm > 0 <- measured, reduce: %{} do
+      for {angle, mm} <- measured, reduce: %{} do
         nearest ->
           ray = Integer.mod(round((angle + :math.pi()) / step), rays)
+          mm = if mm == 0, do: @silent, else: mm
           Map.update(nearest, ray, mm, &min(&1, mm))
       end
 

@@ -92,7 +92,7 @@ defmodule Robot.Localiser.RingCheck do
   defp take(check, %{profile: profile, sonar: ranges}) do
     echoes =
       for {mount, range} <- Enum.zip(profile.sonars, ranges),
-          is_number(range) and range > @near and range < @far,
+          is_number(range) and range > @near and range < min(@far, profile.sonar_max),
           do: polar(Pose.compose(mount, Pose.new(range, 0.0)))
 
     rings = [{check.at, check.turned, echoes} | check.rings]

@@ -108,7 +108,7 @@ defmodule Robot.Localiser.Walls do
     for {mount, range} <- Enum.zip(profile.sonars, percept.sonar),
         is_number(range),
         sonar = Pose.compose(belief.pose, mount),
-        {distance, normal} <- faced(percept.grid, sonar, profile.sonar_cone),
+        {distance, normal} <- faced(percept.grid, sonar, profile),
         not others?(percept, sonar, range),
         reduce: {belief, 0.0, 0.0} do
       {now, got, could} ->
@@ -126,8 +126,8 @@ defmodule Robot.Localiser.Walls do
     end
   end
 
-  defp faced(grid, sonar, cone) do
-    case Facing.find(grid, sonar, cone, @far) do
+  defp faced(grid, sonar, profile) do
+    case Facing.find(grid, sonar, profile.sonar_cone, min(@far, profile.sonar_max)) do
       {distance, _normal} = faced when distance > @near -> [faced]
       _none -> []
     end

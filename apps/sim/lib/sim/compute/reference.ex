@@ -80,17 +80,19 @@ defmodule Sim.Compute.Reference do
     end)
   end
 
-  defp measured(range, _noise, _index, _k, _least, most) when range >= most, do: 0
+  @silent Hal.Scan.silent()
+
+  defp measured(range, _noise, _index, _k, _least, most) when range >= most, do: @silent
 
   defp measured(range, {seed, step, _robot}, index, k, least, most) do
     hash = Noise.hash(seed, step, index, 0x10000 + k)
     range = range + max(0.003, 0.007 * range) * Noise.gauss(hash)
-    if Noise.mix(hash) < 85_899_345, do: 0, else: millimetres(range, least, most)
+    if Noise.mix(hash) < 85_899_345, do: @silent, else: millimetres(range, least, most)
   end
 
   defp measured(range, nil, _index, _k, least, most), do: millimetres(range, least, most)
 
-  defp millimetres(range, least, most) when range < least or range > most, do: 0
+  defp millimetres(range, least, most) when range < least or range > most, do: @silent
   defp millimetres(range, _least, _most), do: trunc(range * 1000.0 + 0.5)
 
   @doc "See `Sim.Compute.look/3`: parts of 8 bytes each."

@@ -41,15 +41,17 @@ defmodule Robot.Localiser.MonteCarlo.Readings do
   """
   @spec pack(Percept.t(), Pose.t()) :: {binary(), counting :: non_neg_integer()}
   def pack(%Percept{profile: profile, sonar: ranges} = percept, pose) do
+    far = min(@far, profile.sonar_max)
+
     readings =
       for {mount, range} <- Enum.zip(profile.sonars, ranges),
           is_number(range) and range > @near,
           not Walls.others?(percept, Pose.compose(pose, mount), range) do
-        echo? = range < @far
+        echo? = range < far
         rays = for share <- @rays, do: mount.heading + share * profile.sonar_cone / 2
         rays = for angle <- rays, part <- [:math.cos(angle), :math.sin(angle)], do: part
-        range = min(range, @far) * 1.0
-        most = if echo?, do: range + @beyond, else: @far
+        range = min(range, far) * 1.0
+        most = if echo?, do: range + @beyond, else: far * 1.0
         {echo?, [mount.x, mount.y] ++ rays ++ [range, most, if(echo?, do: 1.0, else: 0.0)]}
       end
 
