@@ -18,6 +18,7 @@
   body: [
     # about: "a Magellan Pro",           # what people call it
     # mass: 20,                          # kg
+    # board: :kobuki,                    # its controller; also create, turtlebot3_burger, turtlebot3_waffle, arduino
     # radius: 0.2,                       # of the circle round the whole body, about the middle between the wheels
     # length: 0.4,                       # a box has these two; a round body has a radius alone
     # width: 0.4,

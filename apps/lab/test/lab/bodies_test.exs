@@ -152,8 +152,8 @@ defmodule Lab.BodiesTest do
           {%{robots: [:Mag]}, "trial option robots: expected a list of different names, "},
           {%{robots: [:mag1, :mag1]},
            "trial option robots: expected a list of different names, "},
-          {%{robots: [:burger1], hardware: [:burger1]},
-           "burger1 cannot be hardware: only bodies with an rFLEX controller "}
+          {%{robots: [:pioneer3_1], hardware: [:pioneer3_1]},
+           "pioneer3_1 cannot be hardware: its body names no controller "}
         ] do
       assert {:error, line} = Setup.new(options)
       assert String.starts_with?(line, begins), line
