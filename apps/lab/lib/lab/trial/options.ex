@@ -27,7 +27,7 @@ defmodule Lab.Trial.Options do
       iex> Lab.Trial.Options.check(robots: 12)
       {:error, "trial option robots: expected a list of different names, [:mag1, :burger1], got 12"}
       iex> {:ok, options} = Lab.Trial.Options.check(robots: [:rex, :mag1], bodies: [rex: :kobuki])
-      iex> for {id, body} <- options.bodies, do: {id, body.name}
+      iex> Enum.sort(for {id, body} <- options.bodies, do: {id, body.name})
       [mag1: :magellan, rex: :kobuki]
   """
   @spec check(keyword() | map()) :: {:ok, map()} | {:error, line :: String.t()}
