@@ -1,6 +1,6 @@
 defmodule Robot.Devices.SpeechTest do
   @moduledoc "What a robot says aloud, by a program that writes down what it is told."
-  use Robot.Case, async: true
+  use Robot.Case, async: false
   import ExUnit.CaptureLog
   alias Robot.Devices.Speech
   @moduletag :realtime
