@@ -61,6 +61,8 @@ defmodule Docs.Checks do
     "mix calibrate colour /dev/video0 --box 140,90,40,60 --name YellowLandmark --colours config/robots/landmark.txt" =>
       @device,
     "mix calibrate odometry config/robots/mag1.exs" => @robot,
+    "mix calibrate ranges config/robots/mag1.exs --at 0.5,1,2" => @robot,
+    "mix calibrate ranges config/robots/mag1.exs --sensor infrared --at 0.2,0.4,0.6" => @robot,
     "MIX_ENV=prod mix release robot" => @release,
     "MIX_ENV=prod mix release fleet" => @release,
     "MIX_TARGET=robot mix deps.get" => "it needs Hex",
