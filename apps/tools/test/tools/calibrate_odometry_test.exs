@@ -155,10 +155,7 @@ defmodule Tools.CalibrateOdometryTest do
       end)
 
     stop = fn ->
-      receive do
-        :asked -> :ok
-      end
-
+      assert_receive :asked, 30_000
       wait(fn -> World.truth(World.Server.world(server), :mag1).x > 0.2 end)
       Person.type(person, "")
     end
@@ -178,10 +175,12 @@ defmodule Tools.CalibrateOdometryTest do
     assert File.read!(file) == before
   end
 
-  defp wait(done?) do
-    unless done?.() do
-      receive(do: (:never -> :ok), after: (50 -> :ok))
-      wait(done?)
+  # For half a minute.
+  defp wait(done?, left \\ 600) do
+    cond do
+      done?.() -> :ok
+      left == 0 -> flunk("in vain")
+      true -> receive(do: (:never -> :ok), after: (50 -> wait(done?, left - 1)))
     end
   end
 
