@@ -119,14 +119,29 @@ defmodule Console.Report do
       "No formation: #{Format.count(result.robots, "robot")}, and none of them leads.#{said(result)}"
 
   defp outcome(%{formation: formation} = result, true) do
-    living = Enum.count(result.fleet, & &1.alive)
+    {placed, others} =
+      result.fleet
+      |> Enum.filter(& &1.alive)
+      |> Enum.split_with(&(&1.slot != nil or &1.name == result.leader))
 
-    "In formation: #{shape(formation, result.stages)} of #{living} led by #{result.leader}" <>
-      error(formation) <> distance(result.landmark_distance_m) <> "."
+    "In formation: #{shape(formation, result.stages)} of #{length(placed)} led by #{result.leader}" <>
+      error(formation) <> distance(result.landmark_distance_m) <> "." <> apart(others)
   end
 
   defp outcome(%{formation: formation} = result, false),
     do: "Not in formation: #{formation.kind} led by #{result.leader}#{error(formation)}."
+
+  # Robots that live and have no place in the leader's shape, such as those whose wheels were disarmed.
+  defp apart([]), do: ""
+
+  defp apart(robots) do
+    {told, others} = Enum.split(robots, @told)
+    more = if others == [], do: "", else: " and #{length(others)} more"
+    names = Enum.map_join(told, ", ", &"#{&1.name} (#{words(&1.state)})")
+    " Not in it: #{names}#{more}."
+  end
+
+  defp words(state), do: state |> to_string() |> String.replace("_", " ")
 
   # The robots that do not claim `formed`, in the mission's own words.
   defp short([]), do: "."

@@ -129,9 +129,25 @@ defmodule Console.ReportTest do
     refute line.(%{first | uncertainty: nil}) =~ "±"
   end
 
+  test "the summary counts the robots that have a place, and names the others that live" do
+    %{fleet: fleet} = result = result("")
+    [one, other | _] = for %{name: name} <- fleet, name != result.leader, do: name
+
+    left = fn
+      %{name: ^one} = robot -> %{robot | slot: nil, state: :idle}
+      %{name: ^other} = robot -> %{robot | slot: nil, alive: false, state: :dead}
+      robot -> robot
+    end
+
+    summary = hd(Report.summary(%{result | fleet: Enum.map(fleet, left)}, true, 2.0))
+    assert summary =~ "In formation: column of 4 led by"
+    assert summary =~ "Not in it: #{one} (idle)."
+  end
+
   test "the summary says whether there is a formation" do
     result = result("")
     assert hd(Report.summary(result, true, 2.0)) =~ "In formation: column of 6 led by"
+    refute hd(Report.summary(result, true, 2.0)) =~ "Not in it"
     assert hd(Report.summary(result, false, 2.0)) =~ "Not in formation"
     refute hd(Report.summary(%{result | claims: []}, true, 2.0)) =~ "wrongly"
 

@@ -39,8 +39,8 @@ defmodule Console.Cli.Format do
       "mag1 is dead"
       iex> Console.Cli.Format.meaning(%{stage: :disarmed, at_s: 40, robot: :mag1})
       "mag1's wheels were disarmed (its line, or a person), and its mission has ended"
-      iex> Console.Cli.Format.meaning(%{stage: :formed, at_s: 40, robot: :mag1, as: :turned, asked: "line 2.0"})
-      "every robot says that it stands in its place, turned: no room for line 2.0"
+      iex> Console.Cli.Format.meaning(%{stage: :formed, at_s: 40, robot: :mag1, followers: 3, as: :turned, asked: "line 2.0"})
+      "mag1 and its 3 followers say that they stand in their places, turned: no room for line 2.0"
       iex> Console.Cli.Format.meaning(%{stage: :cannot_form, at_s: 40, robot: :mag1, asked: "line 2.0", followers: 4})
       "where mag1 stands there is no room for line 2.0, nor for 4 followers in any other shape"
   """
@@ -58,8 +58,8 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: :search}), do: "every robot looks around for the landmark"
   def meaning(%{stage: :elected} = stage), do: "#{stage.robot} leads" <> why(stage)
 
-  def meaning(%{stage: :formed, as: shape, asked: asked}),
-    do: "every robot says that it stands in its place, #{shape(shape)}: no room for #{asked}"
+  def meaning(%{stage: :formed, as: shape, asked: asked} = stage),
+    do: "#{places(stage)}, #{shape(shape)}: no room for #{asked}"
 
   def meaning(%{stage: :cannot_form, robot: robot, asked: asked, followers: count}) do
     "where #{robot} stands there is no room for #{asked}, nor for #{count(count, "follower")} in any other shape"
@@ -73,7 +73,7 @@ defmodule Console.Cli.Format do
 
   def meaning(%{stage: :estop_over}), do: "no robot is held any more; they stand until a start"
 
-  def meaning(%{stage: :formed}), do: "every robot says that it stands in its place"
+  def meaning(%{stage: :formed} = stage), do: places(stage)
   def meaning(%{stage: :landmark_moved}), do: "the landmark starts to move"
   def meaning(%{stage: :killed, robot: robot}), do: "#{robot} is dead"
 
@@ -282,6 +282,15 @@ defmodule Console.Cli.Format do
       parts -> " (#{Enum.join(parts, ", ")})"
     end
   end
+
+  # How many robots it is said of; a mission of one's own need not count them.
+  defp places(%{robot: robot, followers: 0}), do: "#{robot} says that it stands in its place"
+
+  defp places(%{robot: robot, followers: followers}),
+    do: "#{robot} and its #{count(followers, "follower")} say that they stand in their places"
+
+  defp places(%{robot: robot}), do: "#{robot} says that all stand in their places"
+  defp places(_fleet), do: "all say that they stand in their places"
 
   defp shape(:turned), do: "turned"
   defp shape(:closer), do: "closer together"

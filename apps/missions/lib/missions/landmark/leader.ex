@@ -214,9 +214,14 @@ defmodule Missions.Landmark.Leader do
 
   defp news?(_other, _pose, _shape, _now), do: true
 
-  # If there was no room for the shape that was asked for, which one it is instead.
+  # Of how many followers it is said; if there was no room for the shape that was asked for, which one it is instead.
   defp formed(%{leadership: %{shape: %{rung: rung}}} = mission) do
-    facts = %{epoch: mission.epoch, size_ppm: mission.sight.size_ppm}
+    facts = %{
+      epoch: mission.epoch,
+      size_ppm: mission.sight.size_ppm,
+      followers: length(mission.order)
+    }
+
     if rung == :asked, do: facts, else: Map.merge(facts, %{as: rung, asked: asked(mission)})
   end
 
