@@ -93,28 +93,48 @@ defmodule Console.About do
     })
   end
 
-  defp told(status) do
+  @doc "The same where nothing is known but what is put into it."
+  @spec nothing() :: t()
+  def nothing do
     %{
+      by: nil,
+      wishes: [],
+      way: [],
+      pose: nil,
+      fault: nil,
+      speed: nil,
+      turn: nil,
+      limits: [],
+      power: nil,
+      offline: [],
+      estop: nil,
+      sonar: [],
+      cone: :math.pi() / 12,
+      seen: nil,
+      camera: false,
+      pictures: nil,
+      looks: nil,
+      sees: nil,
+      notes: []
+    }
+  end
+
+  defp told(status) do
+    Map.merge(nothing(), %{
       by: status.by,
       wishes: for({by, weight} <- status.weights, do: [by, weight]),
       way: for({x, y} <- status.way, do: [x, y]),
       pose: with(%Pose{x: x, y: y} <- status.pose, do: [x, y]),
       fault: status.fault,
       speed: status.speed,
-      turn: nil,
       limits: status.limits,
       power: status.power,
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
-      sonar: [],
-      cone: :math.pi() / 12,
-      seen: nil,
-      camera: false,
-      pictures: nil,
       looks: Sight.words(status.head),
       sees: Sight.words(status.sees),
       notes: notes(status)
-    }
+    })
   end
 
   # Only one that answers is asked, within half a second.

@@ -24,9 +24,10 @@ defmodule Console.Live do
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
   @typedoc """
-  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed.
+  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed. A recording
+  is shown at any time of its run, and takes no orders (`:replay`).
   """
-  @type offer :: :kill | :landmark | :arm
+  @type offer :: :kill | :landmark | :arm | :replay
 
   @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
   @callback pace(live :: term()) :: String.t() | nil
@@ -57,5 +58,44 @@ defmodule Console.Live do
   @doc "What one robot knows and does, as the page shows it (`Console.About`); `nil` if that is not known here."
   @callback about(live :: term(), atom()) :: map() | nil
 
-  @optional_callbacks offers: 1, notice: 1, status: 2, about: 2
+  # A recording has these, too.
+
+  @typedoc """
+  A run for a strip of time: its length, how far it is known, whether it goes on, how many entries there are in all, and the
+  newest of these, oldest first. `at_s` is missing from an entry that only has `stages`.
+  """
+  @type history :: %{
+          last_s: float(),
+          known_s: float(),
+          playing: boolean(),
+          count: non_neg_integer(),
+          entries: [
+            %{
+              required(:stages) => [map()],
+              optional(:at_s) => float(),
+              optional(:error) => [float()] | nil,
+              optional(:leader) => atom() | nil,
+              optional(:formed) => boolean(),
+              optional(:held) => boolean()
+            }
+          ]
+        }
+
+  @doc "Carries out what a person types, where the lines of `Console.Prompt` mean nothing."
+  @callback answer(live :: term(), text :: String.t()) ::
+              {:ok, String.t() | [String.t()]} | {:error, String.t()}
+
+  @doc "The run, with the entries after the first so many."
+  @callback history(live :: term(), after_count :: non_neg_integer()) :: history()
+
+  @doc "The scene of another run that is shown beside this one, at the same time; `nil` for none."
+  @callback beside(live :: term()) :: Sim.Scene.t() | nil
+
+  @optional_callbacks offers: 1,
+                      notice: 1,
+                      status: 2,
+                      about: 2,
+                      answer: 2,
+                      history: 2,
+                      beside: 1
 end

@@ -2,10 +2,22 @@ defmodule Tools.Replay do
   @moduledoc """
   Replays a recording for people, of a run in lockstep or of robots of processes (`.Recording`): prints its stages, says whether
   every decision is as recorded (`.Verdict`), how the fleet stood at a time (`.Moment`), compares two recordings, and goes
-  through one tick by tick (`.Session`).
+  through one tick by tick at a prompt (`.Session`) or in the browser (`.Live`).
   """
   alias Console.Cli.{Format, Output}
-  alias Tools.Replay.{Asked, Difference, Guard, Moment, Options, Recording, Session, Verdict}
+
+  alias Tools.Replay.{
+    Asked,
+    Difference,
+    Guard,
+    Live,
+    Moment,
+    Options,
+    Recording,
+    Session,
+    Verdict
+  }
+
   alias Console.Tables
   alias Record.Recording.Comparison
   alias Lab.Replay.Kind
@@ -36,6 +48,7 @@ defmodule Tools.Replay do
     Session.run(options, recording)
   end
 
+  defp follow(recording, %{page: true} = options), do: page(recording, options)
   defp follow(recording, %{against: nil} = options), do: replay(recording, options)
   defp follow(recording, options), do: against(recording, options)
 
@@ -45,15 +58,23 @@ defmodule Tools.Replay do
   end
 
   defp against(one, options) do
+    with {:ok, other} <- other(one, options), do: told(first(one, other))
+  end
+
+  defp other(one, options) do
     with {:ok, other} <- Recording.open(options.against),
-         :ok <- Recording.alike(one, other) do
-      if one.begin == other.begin do
-        told(Comparison.first(Recording.comparable(one), Recording.comparable(other)))
-      else
-        IO.puts("The two begin differently: #{Difference.options(one.options, other.options)}")
-        2
-      end
-    end
+         :ok <- Recording.alike(one, other),
+         do: {:ok, other}
+  end
+
+  defp first(%{begin: begin} = one, %{begin: begin} = other),
+    do: Comparison.first(Recording.comparable(one), Recording.comparable(other))
+
+  defp first(one, other), do: {:begins, Difference.options(one.options, other.options)}
+
+  defp told({:begins, how}) do
+    IO.puts("The two begin differently: #{how}")
+    2
   end
 
   defp told({:same, until_ms}) do
@@ -69,6 +90,43 @@ defmodule Tools.Replay do
   defp told({:differs, difference}) do
     Enum.each(Difference.parted(difference), &IO.puts/1)
     2
+  end
+
+  # Until a person presses Enter.
+  defp page(recording, options) do
+    robots = Enum.map(Recording.names(recording), &String.to_existing_atom/1)
+
+    with {:ok, recordings, parts} <- beside(recording, options),
+         {:ok, _page, url} <- Console.Page.start_link(module: Live, live: self(), robots: robots) do
+      Enum.each(recordings, &IO.puts(Recording.heading(&1)))
+      IO.puts("Page:  #{url}")
+      IO.puts("Enter ends this program.")
+      live = self()
+
+      spawn_link(fn ->
+        _line = IO.gets("")
+        Live.close(live)
+      end)
+
+      at_ms = round(1000 * (options.at_s || 0.0))
+      if Live.loop(Live.new(recordings, at_ms, parts)), do: 2, else: 0
+    end
+  end
+
+  defp beside(one, %{against: nil}), do: {:ok, [one], nil}
+
+  defp beside(one, options) do
+    with {:ok, other} <- other(one, options) do
+      parts =
+        case first(one, other) do
+          {:begins, how} -> {0, "the two begin differently: #{how}"}
+          {:differs, difference} -> {difference.at_ms, hd(Difference.parted(difference))}
+          {:ends, after_ms} -> {after_ms, "one of the two ends here"}
+          {:same, _until_ms} -> nil
+        end
+
+      {:ok, [one, other], parts}
+    end
   end
 
   defp replay(recording, options) do

@@ -65,6 +65,88 @@ defmodule Tools.ReplayTest do
     assert line == "replay: --at 99.0 is after the end of the recording, 25.0 s\n"
   end
 
+  # A recording as the page asks for it.
+  defp shown(paths, at_ms, parts) do
+    recordings =
+      for path <- paths do
+        {:ok, recording} = Replay.Recording.open(path)
+        recording
+      end
+
+    test = self()
+
+    live =
+      :proc_lib.spawn_link(fn ->
+        send(test, {:closed, Replay.Live.loop(Replay.Live.new(recordings, at_ms, parts))})
+      end)
+
+    {live, read(live, Replay.Live.history(live, 0))}
+  end
+
+  defp read(_live, %{known_s: last_s, last_s: last_s} = history), do: history
+  defp read(live, _history), do: read(live, Replay.Live.history(live, 0))
+
+  test "a browser is shown any time of a run, and why a robot did what it did then", %{
+    tmp_dir: folder
+  } do
+    path = record(folder, "run.mcap", "--robots 3 --kill leader@15 --duration 25")
+    {live, history} = shown([path], 14_000, nil)
+    stages = Enum.flat_map(history.entries, & &1.stages)
+    assert [:search, :elected | _] = Enum.map(stages, & &1.stage)
+    assert %{at_s: 15.0, robot: dead} = Enum.find(stages, &(&1.stage == :killed))
+    assert [0.0, 0.5, 1.0 | _] = Enum.map(history.entries, & &1.at_s)
+    assert %{entries: [_last]} = Replay.Live.history(live, history.count - 1)
+
+    # As far as was asked for, once it had been read.
+    assert %{at_ms: 14_000, leader: ^dead} = Replay.Live.scene(live)
+    assert "recording, paused at 14.0 s of 25.0 s" = Replay.Live.pace(live)
+    assert {:ok, "15.1 s"} = Replay.Live.answer(live, "next")
+    assert %{alive: false} = Enum.find(Replay.Live.scene(live).robots, &(&1.id == dead))
+    assert {:ok, "15.0 s"} = Replay.Live.answer(live, "back")
+    assert {:ok, "14.0 s"} = Replay.Live.answer(live, "goto 14")
+    assert {:ok, why} = Replay.Live.answer(live, "why leader")
+    assert Enum.any?(why, &(&1 =~ "<- chosen"))
+    assert %{why: ^why, wishes: [_chosen | _]} = Replay.Live.about(live, dead)
+    assert %{why: [_line]} = Replay.Live.about(live, :nobody_of_this_name)
+    assert nil == Replay.Live.beside(live)
+
+    # It goes on at its own pace, and stands at the end.
+    assert {:ok, _said} = Replay.Live.answer(live, "goto 24.5")
+    assert {:ok, _said} = Replay.Live.answer(live, "speed max")
+    assert {:ok, _said} = Replay.Live.answer(live, "play")
+    ended(live)
+    assert %{at_ms: 25_000} = Replay.Live.scene(live)
+
+    for {typed, line} <- [
+          {"estop", "this is a recording: nothing in it can be told anything, or be stopped"},
+          {"goto 26", ~s(goto: expected a number from 0 to 25.0, got "26")},
+          {"next", "no event of the fleet is known there"},
+          {"speed 0", ~s(speed: expected a number from 0.1 to 100, or max, got "0")}
+        ],
+        do: assert({:error, line} == Replay.Live.answer(live, typed))
+
+    Replay.Live.close(live)
+    assert_receive {:closed, false}
+  end
+
+  defp ended(live), do: unless(Replay.Live.pace(live) =~ "paused", do: ended(live))
+
+  test "two runs are shown side by side, at one time", %{tmp_dir: folder} do
+    one = record(folder, "one.mcap", "--robots 2 --duration 3")
+    other = record(folder, "other.mcap", "--robots 2 --duration 2 --seed 2")
+    {live, history} = shown([one, other], 0, {0, "they begin differently"})
+    stages = Enum.flat_map(history.entries, & &1.stages)
+    assert %{line: "they begin differently"} = Enum.find(stages, &(&1.stage == :parts))
+    assert {:ok, "1.5 s"} = Replay.Live.answer(live, "goto 1.5")
+    assert {1_500, 1_500} = {Replay.Live.scene(live).at_ms, Replay.Live.beside(live).at_ms}
+    assert {:ok, "3.0 s"} = Replay.Live.answer(live, "goto 3")
+    # The shorter one stands at its end.
+    assert {3_000, 2_000} = {Replay.Live.scene(live).at_ms, Replay.Live.beside(live).at_ms}
+    refute Replay.Live.scene(live).robots == Replay.Live.beside(live).robots
+    Replay.Live.close(live)
+    assert_receive {:closed, false}
+  end
+
   defp step_through(path, line, typed) do
     {:ok, options} = Replay.Options.parse([path | String.split(line)])
     test = self()

@@ -2,10 +2,11 @@ defmodule Console.Page.Client do
   @moduledoc false
   # Tells the page of the robot that a person looks at there, five times a second.
   use GenServer
-  alias Console.Page.Feed
+  alias Console.Page.{Feed, State}
   alias Console.About
 
   @about_ms 200
+  @history_ms 500
 
   @doc """
   Starts it for the connection of the caller, and linked to it: without one of them the other is of no use, and the page
@@ -22,7 +23,18 @@ defmodule Console.Page.Client do
   def init({connection, feed, reply}) do
     ref = Process.monitor(connection)
     {module, live} = Feed.source(feed)
-    {:ok, %{connection: ref, feed: feed, module: module, live: live, reply: reply, looked: nil}}
+    if function_exported?(module, :history, 2), do: send(self(), :history)
+
+    {:ok,
+     %{
+       connection: ref,
+       feed: feed,
+       module: module,
+       live: live,
+       reply: reply,
+       looked: nil,
+       told: nil
+     }}
   end
 
   @impl GenServer
@@ -42,6 +54,15 @@ defmodule Console.Page.Client do
 
     _timer = Process.send_after(self(), :about, @about_ms)
     {:noreply, s}
+  end
+
+  # Only what is new.
+  def handle_info(:history, s) do
+    history = s.module.history(s.live, if(s.told, do: s.told.count, else: 0))
+    news = %{history | entries: []}
+    if news != s.told, do: s.reply.(State.history(history))
+    _timer = Process.send_after(self(), :history, @history_ms)
+    {:noreply, %{s | told: news}}
   end
 
   # A connection that ends as it should takes no linked process along.

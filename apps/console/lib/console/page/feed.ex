@@ -77,7 +77,8 @@ defmodule Console.Page.Feed do
   def handle_info(:tick, s) do
     scene = s.module.scene(s.live)
     {pace, notice} = {s.module.pace(s.live), s.module.notice(s.live)}
-    json = State.scene(scene, pace, notice, Hal.Clock.now_ms())
+    beside = if function_exported?(s.module, :beside, 1), do: s.module.beside(s.live)
+    json = State.scene(scene, pace, notice, Hal.Clock.now_ms(), beside)
     for pusher <- s.waiting, do: send(pusher, {:scene, json})
     s = %{s | scene: scene, changes: Changes.note(s.changes, scene)}
     {:noreply, tick(%{s | waiting: [], ticking?: false})}

@@ -49,7 +49,13 @@ defmodule Console.Page.Line do
   def order("present", given_us, _robots, _source) when given_us != nil,
     do: {:ok, Orders.of_presence(given_us)}
 
-  def order(text, given_us, robots, source) do
+  def order(text, given_us, robots, {module, live} = source) do
+    if function_exported?(module, :answer, 2),
+      do: {:ok, question(text, text, given_us, fn -> module.answer(live, text) end)},
+      else: spoken(text, given_us, robots, source)
+  end
+
+  defp spoken(text, given_us, robots, source) do
     case Teleop.word(text, robots) do
       {:ok, robot, stick} -> timed(Orders.of_word(robot, stick, :page, source, given_us))
       :other -> typed(text, Prompt.parse(text, robots), given_us, source)
@@ -82,15 +88,17 @@ defmodule Console.Page.Line do
   defp view({hand, _whom}, _text, _given_us, _source) when hand in [:drive, :gamepad],
     do: {:error, "#{hand} is for the terminal; here the keys drive by the button Drive by keys"}
 
-  defp view(question, text, given_us, {module, live}) do
-    {:ok,
-     %{
-       kind: :question,
-       key: question,
-       line: text,
-       given_us: given_us,
-       run: fn _age_ms -> {:ok, lines(question, module, live)} end
-     }}
+  defp view(question, text, given_us, {module, live}),
+    do: {:ok, question(question, text, given_us, fn -> {:ok, lines(question, module, live)} end)}
+
+  defp question(key, text, given_us, answer) do
+    %{
+      kind: :question,
+      key: key,
+      line: text,
+      given_us: given_us,
+      run: fn _age_ms -> answer.() end
+    }
   end
 
   defp lines(:help, module, live), do: Prompt.help(module.offers(live))

@@ -57,16 +57,21 @@ defmodule Console.Page.State do
   The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
   robot of a real fleet may have no known pose. `now_ms` is the time of this node (`System.monotonic_time/1`), by which the
   page says when an order was given. Only robots of one `frame` are drawn together; `apart` says why one is not
-  in that of most.
+  in that of most. `beside` is the scene of another run at the same time, if one is shown beside this one.
   """
-  @spec scene(Scene.t(), String.t() | nil, String.t() | nil, now_ms :: integer()) :: String.t()
-  def scene(%Scene{} = scene, pace, notice, now_ms) do
-    Json.encode!(%{
-      t: "scene",
-      now: now_ms,
+  @spec scene(Scene.t(), String.t() | nil, String.t() | nil, now_ms :: integer(), Scene.t() | nil) ::
+          String.t()
+  def scene(%Scene{} = scene, pace, notice, now_ms, beside \\ nil) do
+    scene
+    |> run()
+    |> Map.merge(%{t: "scene", now: now_ms, pace: pace, notice: notice})
+    |> Map.put(:beside, beside && run(beside))
+    |> Json.encode!()
+  end
+
+  defp run(scene) do
+    %{
       at_s: scene.at_ms / 1000,
-      pace: pace,
-      notice: notice,
       leader: scene.leader,
       epoch: scene.epoch,
       formation: scene.formation && Tuple.to_list(scene.formation),
@@ -77,8 +82,20 @@ defmodule Console.Page.State do
       robots: Enum.map(scene.robots, &robot/1),
       told: Scene.told(scene.stages),
       stages: scene.stages |> Enum.take(-@stages) |> Enum.map(&stage/1)
-    })
+    }
   end
+
+  @doc "What a recording tells of its run (`t:Console.Live.history/0`)."
+  @spec history(Console.Live.history()) :: String.t()
+  def history(history) do
+    entries = for entry <- history.entries, do: rounded(entry)
+    Json.encode!(%{history | entries: entries} |> Map.put(:t, "history"))
+  end
+
+  defp rounded(%{error: [_mean, _max] = error} = entry),
+    do: %{entry | error: Enum.map(error, &round3/1)}
+
+  defp rounded(entry), do: entry
 
   defp robot(robot) do
     %{

@@ -26,19 +26,23 @@ defmodule Tools.Replay.Guard do
       error_logger: false
     }
 
-    {pid, monitor} =
-      :erlang.spawn_opt(
+    {guard, ref} = {self(), make_ref()}
+
+    # In it a `GenServer` may take over.
+    pid =
+      :proc_lib.spawn_opt(
         fn ->
           Process.put(__MODULE__, passed)
-          exit({__MODULE__, outcome(read)})
+          send(guard, {ref, outcome(read)})
         end,
-        [:monitor, max_heap_size: heap]
+        max_heap_size: heap
       )
 
     wait(%{
       path: path,
       pid: pid,
-      monitor: monitor,
+      ref: ref,
+      monitor: Process.monitor(pid),
       passed: passed,
       seen: {0, 0}
     })
@@ -54,15 +58,27 @@ defmodule Tools.Replay.Guard do
   @spec watched(Enumerable.t()) :: Enumerable.t()
   def watched(ticks) do
     Stream.map(ticks, fn tick ->
-      with passed when passed != nil <- Process.get(__MODULE__), do: :atomics.add(passed, 1, 1)
+      passed()
       tick
     end)
   end
 
-  defp wait(%{monitor: monitor, pid: pid} = guard) do
+  @doc "Begins a new measure: what the caller does next is no work on a tick."
+  @spec passed() :: :ok
+  def passed do
+    with passed when passed != nil <- Process.get(__MODULE__),
+         do: :atomics.add(passed, 1, 1),
+         else: (nil -> :ok)
+  end
+
+  defp wait(%{monitor: monitor, pid: pid, ref: ref} = guard) do
     receive do
-      {:DOWN, ^monitor, :process, ^pid, {__MODULE__, outcome}} -> result(outcome, guard.path)
-      {:DOWN, ^monitor, :process, ^pid, _killed} -> told(guard.path, "takes too much memory")
+      {^ref, outcome} ->
+        Process.demonitor(monitor, [:flush])
+        result(outcome, guard.path)
+
+      {:DOWN, ^monitor, :process, ^pid, _killed} ->
+        told(guard.path, "takes too much memory")
     after
       @look_ms -> look(guard)
     end

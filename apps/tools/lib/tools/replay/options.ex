@@ -10,6 +10,7 @@ defmodule Tools.Replay.Options do
             against: nil,
             csv: nil,
             step: false,
+            page: false,
             help: false
 
   @type t :: %__MODULE__{
@@ -21,6 +22,7 @@ defmodule Tools.Replay.Options do
           against: Path.t() | nil,
           csv: Path.t() | nil,
           step: boolean(),
+          page: boolean(),
           help: boolean()
         }
 
@@ -52,17 +54,23 @@ defmodule Tools.Replay.Options do
     end
   end
 
-  # These go through all of a run.
-  defp alone(%{step: true} = options) do
-    case for {name, value} <- [until: options.until_s, against: options.against, csv: options.csv],
-             value != nil,
-             do: "--step cannot be used with --#{name}" do
-      [] -> {:ok, options}
-      lines -> {:error, lines}
-    end
-  end
+  # A prompt and a page go by themselves; the others go through all of a run.
+  defp alone(options) do
+    through = [until: options.until_s, csv: options.csv]
 
-  defp alone(options), do: {:ok, options}
+    step =
+      if options.step, do: [page: options.page, against: options.against] ++ through, else: []
+
+    page = if options.page, do: [why: options.why, robot: options.robot] ++ through, else: []
+
+    lines =
+      for {option, others} <- [step: step, page: page],
+          {name, value} <- others,
+          value not in [nil, false],
+          do: "--#{option} cannot be used with --#{name}"
+
+    if lines == [], do: {:ok, options}, else: {:error, lines}
+  end
 
   @doc "The help text of `mix replay`."
   @spec help() :: String.t()
@@ -80,7 +88,9 @@ defmodule Tools.Replay.Options do
       mix replay run.mcap --at 42.3                            how the fleet stood then
       mix replay run.mcap --at 42.3 --why leader               why its leader did what it did
       mix replay run.mcap --step --at 42                       forwards and backwards from there
+      mix replay run.mcap --page                               in the browser: play, pause, choose a robot, read why
       mix replay run.mcap --against other.mcap                 where two runs part
+      mix replay run.mcap --against other.mcap --page          both side by side
       mix replay run.mcap --csv tables                         for a spreadsheet, or pandas
 
     Exit status: 0 all is the same; 2 something differs, or could not be compared because it was
@@ -98,6 +108,7 @@ defmodule Tools.Replay.Options do
       {"against", "FILE.mcap", &file(&1, folder),
        "compare with another recording: the first tick that differs, and in what"},
       {"step", nil, nil, "go forwards and backwards tick by tick, and ask: a prompt"},
+      {"page", nil, nil, "show it in the browser, with a strip of time"},
       {"csv", "DIR", &Parse.folder(&1, folder),
        "write poses, errors, messages, ticks and events as tables"}
     ]
