@@ -28,8 +28,8 @@ defmodule Console.Live do
   """
   @type offer :: :kill | :landmark | :arm
 
-  @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
-  @callback pace(live :: term()) :: String.t() | nil
+  @doc "How fast it goes; `nil` for one that goes by the real clock."
+  @callback pace(live :: term()) :: Console.Pace.t() | nil
 
   @doc "Its processes of the operating system, and how to reach them, one line each."
   @callback lines(live :: term()) :: [String.t()]
