@@ -29,8 +29,8 @@ defmodule Console.Live do
   """
   @type offer :: :kill | :landmark | :arm | :replay
 
-  @doc "How fast it goes, for people; `nil` for one that goes by the real clock."
-  @callback pace(live :: term()) :: String.t() | nil
+  @doc "How fast it goes; `nil` for one that goes by the real clock."
+  @callback pace(live :: term()) :: Console.Pace.t() | nil
 
   @doc "Its processes of the operating system, and how to reach them, one line each."
   @callback lines(live :: term()) :: [String.t()]
@@ -61,17 +61,18 @@ defmodule Console.Live do
   # A recording has these, too.
 
   @typedoc """
-  A run for a strip of time: its length, how far it is known, whether it goes on, how many entries there are in all, and the
+  A run for a strip of time: its length, how far it is known, whether it goes on, its name and that of the one beside it, how many entries there are in all, and the
   newest of these, oldest first. `at_s` is missing from an entry that only has `stages`.
   """
   @type history :: %{
           last_s: float(),
           known_s: float(),
           playing: boolean(),
+          names: [String.t()],
           count: non_neg_integer(),
           entries: [
             %{
-              required(:stages) => [map()],
+              required(:stages) => [Sim.Scene.stage()],
               optional(:at_s) => float(),
               optional(:error) => [float()] | nil,
               optional(:leader) => atom() | nil,

@@ -52,7 +52,7 @@ defmodule Console.PageDriveTest do
         Browser.keyboard(browser, :down, code: "KeyD", key: "d", autoRepeat: true, modifiers: 2)
       end,
       "a dialog": fn ->
-        Browser.run(browser, "setTimeout(() => document.getElementById('reset').click())")
+        Browser.run(browser, "setTimeout(() => alert('of the browser'))")
         Swarm.Case.eventually(fn -> dismissed?(browser) end)
       end,
       "the focus elsewhere": fn ->
@@ -180,15 +180,24 @@ defmodule Console.PageDriveTest do
     end
 
     [] = answers.()
+
+    # Towards the middle of the hall, where nothing stands.
+    [x, y] =
+      Browser.run(browser, """
+      const box = document.getElementById('map').getBoundingClientRect(), [r] = window.floor.scene.robots;
+      const [x, y] = window.floor.toPixel(0.7 * r.x, 0.7 * r.y);
+      return [Math.round(x + box.left), Math.round(y + box.top)];
+      """)
+
     at = fn type, x, y, more -> Browser.mouse(browser, type, [x: x, y: y] ++ more) end
     left = [button: "left", buttons: 1, clickCount: 1]
-    at.("mousePressed", 300, 300, button: "right", buttons: 2, clickCount: 1)
-    at.("mouseReleased", 300, 300, button: "right", clickCount: 1)
+    at.("mousePressed", x, y, button: "right", buttons: 2, clickCount: 1)
+    at.("mouseReleased", x, y, button: "right", clickCount: 1)
     # The release was outside of what the page is told.
-    at.("mousePressed", 300, 310, left)
+    at.("mousePressed", x, y + 10, left)
     Browser.run(browser, "window.dispatchEvent(new Event('blur'))")
-    at.("mouseReleased", 300, 310, button: "left", clickCount: 1)
-    at.("mousePressed", 300, 320, left)
+    at.("mouseReleased", x, y + 10, button: "left", clickCount: 1)
+    at.("mousePressed", x, y + 20, left)
 
     Browser.run(browser, """
     const finger = (type, id) => document.getElementById('map').dispatchEvent(new PointerEvent(type,
@@ -196,10 +205,10 @@ defmodule Console.PageDriveTest do
     for (const type of ["pointerdown", "pointerup"]) finger(type, 8);
     """)
 
-    at.("mouseReleased", 300, 320, button: "left", clickCount: 1)
+    at.("mouseReleased", x, y + 20, button: "left", clickCount: 1)
     # Then one that is whole.
-    at.("mousePressed", 300, 330, left)
-    at.("mouseReleased", 300, 330, button: "left", clickCount: 1)
+    at.("mousePressed", x, y + 30, left)
+    at.("mouseReleased", x, y + 30, button: "left", clickCount: 1)
     Swarm.Case.eventually(fn -> answers.() != [] end)
     assert [line] = answers.()
     assert line =~ "goto #{id}"

@@ -139,10 +139,10 @@ defmodule Console.PageMeshTest do
       Browser.await(browser, "return window.floor.scene.robots[0].state === 'disarmed'")
       assert {:error, _disarmed} = Swarm.tell(:mag41, "move:0.2:0")
 
-      Browser.run(
-        browser,
-        "window.confirm = () => true; document.querySelector('[data-one=arm]').click()"
-      )
+      # It asks in its place.
+      Browser.run(browser, "document.querySelector('[data-one=arm]').click()")
+      assert Browser.run(browser, "return document.querySelector('.asked').textContent") =~ "turn"
+      Browser.run(browser, "document.querySelector('.asked button').click()")
 
       Browser.await(browser, "return window.floor.scene.robots[0].state === 'idle'")
 
@@ -167,6 +167,8 @@ defmodule Console.PageMeshTest do
 
       assert Swarm.status(:min41).estop
       Browser.run(browser, "document.getElementById('reset').click()")
+      assert Swarm.status(:min41).estop
+      Browser.run(browser, "document.querySelector('.asked button').click()")
 
       Browser.await(
         browser,

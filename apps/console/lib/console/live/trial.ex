@@ -106,7 +106,7 @@ defmodule Console.Live.Trial do
 
   def handle_call(:result, _from, state), do: {:reply, state.module.result(state.trial), state}
 
-  def handle_call(:pace, _from, state), do: {:reply, Pace.words(state.pace), state}
+  def handle_call(:pace, _from, state), do: {:reply, state.pace, state}
 
   def handle_call({:command, {:pace, command}, _given_us}, _from, state) do
     case Pace.command(state.pace, command) do

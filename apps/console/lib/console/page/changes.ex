@@ -10,9 +10,10 @@ defmodule Console.Page.Changes do
   # Of each robot the newest are kept.
   @most 20
 
-  defstruct states: %{}, lines: %{}
+  defstruct at_ms: 0, states: %{}, lines: %{}
 
   @type t :: %__MODULE__{
+          at_ms: integer(),
           states: %{atom() => atom() | String.t()},
           lines: %{atom() => [{at_s :: float(), line :: String.t()}]}
         }
@@ -29,7 +30,13 @@ defmodule Console.Page.Changes do
   @spec note(t(), Scene.t()) :: t()
   def note(changes, %Scene{map: nil}), do: changes
 
+  # A recording was turned back: what was to come is not known yet.
+  def note(%{at_ms: before_ms}, %{at_ms: at_ms} = scene) when at_ms < before_ms,
+    do: note(%__MODULE__{}, scene)
+
   def note(changes, scene) do
+    changes = %{changes | at_ms: scene.at_ms}
+
     Enum.reduce(scene.robots, changes, fn %{id: id, state: state}, changes ->
       if changes.states[id] == state,
         do: changes,

@@ -55,7 +55,12 @@ defmodule Console.Page.Feed do
   @impl GenServer
   def handle_call(:map, _from, %{map: nil} = s) do
     map =
-      State.map(s.module.scene(s.live), s.module.offers(s.live), Swarm.MissionRegistry.names())
+      State.map(
+        s.module.scene(s.live),
+        s.module.offers(s.live),
+        Swarm.MissionRegistry.names(),
+        beside(s)
+      )
 
     {:reply, map, %{s | map: map}}
   end
@@ -77,12 +82,13 @@ defmodule Console.Page.Feed do
   def handle_info(:tick, s) do
     scene = s.module.scene(s.live)
     {pace, notice} = {s.module.pace(s.live), s.module.notice(s.live)}
-    beside = if function_exported?(s.module, :beside, 1), do: s.module.beside(s.live)
-    json = State.scene(scene, pace, notice, Hal.Clock.now_ms(), beside)
+    json = State.scene(scene, pace, notice, Hal.Clock.now_ms(), beside(s))
     for pusher <- s.waiting, do: send(pusher, {:scene, json})
     s = %{s | scene: scene, changes: Changes.note(s.changes, scene)}
     {:noreply, tick(%{s | waiting: [], ticking?: false})}
   end
+
+  defp beside(s), do: if(function_exported?(s.module, :beside, 1), do: s.module.beside(s.live))
 
   defp tick(%{ticking?: true} = s), do: s
 

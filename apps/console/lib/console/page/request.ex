@@ -176,13 +176,17 @@ defmodule Console.Page.Request do
   defp line(text, s, reply) do
     heard_us = System.monotonic_time(:microsecond)
 
-    with :ok <- readable(text),
-         {line, given_us} = Line.given(text, heard_us),
-         {:ok, order} <- Line.order(line, given_us, s.robots.(), s.source) do
-      Orders.give(s.orders, %{order | given_us: given_us || heard_us})
-    else
+    case readable(text) do
+      :ok -> text |> Line.given(heard_us) |> order(heard_us, s, reply)
+      error -> reply.(State.answer("", error))
+    end
+  end
+
+  defp order({line, given_us}, heard_us, s, reply) do
+    case Line.order(line, given_us, s.robots.(), s.source) do
+      {:ok, order} -> Orders.give(s.orders, %{order | given_us: given_us || heard_us})
       {:look, robot} -> Client.look(s.client, robot)
-      {:error, _line} = error -> reply.(State.answer("", error))
+      error -> reply.(State.answer(line, error))
     end
   end
 

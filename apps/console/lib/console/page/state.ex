@@ -1,7 +1,8 @@
 defmodule Console.Page.State do
   @moduledoc "Describes what the page is told of a fleet, as JSON. Pure; metres and radians, to millimetres and milliradians."
-  alias Console.Cli.Format
+  alias Console.Cli.{Condition, Format}
   alias Console.Picture.Floorplan
+  alias Console.Pace
   alias Hal.Json
   alias Sim.Scene
 
@@ -12,11 +13,13 @@ defmodule Console.Page.State do
 
   @doc """
   What does not change: what the fleet offers, the missions that it may start, and the map, its name, its size, and its walls as rectangles
-  `[x, y, width, height]`, rows of equal cells. Where there is no map, its size is 0.
+  `[x, y, width, height]`, rows of equal cells. Where there is no map, its size is 0. `beside` is the scene of the run beside it.
   """
-  @spec map(Scene.t(), [Console.Live.offer()], missions :: [String.t()]) :: String.t()
-  def map(%Scene{map: map}, offers, missions) do
-    told = %{t: "map", offers: offers, missions: missions, cell: @cell}
+  @spec map(Scene.t(), [Console.Live.offer()], missions :: [String.t()], Scene.t() | nil) ::
+          String.t()
+  def map(%Scene{map: map}, offers, missions, beside \\ nil) do
+    beside = beside && ground(beside.map)
+    told = %{t: "map", offers: offers, missions: missions, cell: @cell, beside: beside}
     map |> ground() |> Map.merge(told) |> Json.encode!()
   end
 
@@ -55,19 +58,31 @@ defmodule Console.Page.State do
 
   @doc """
   The scene, with the pace of a run in lockstep (`nil`: real time), and what a person should know before all else. A
-  robot of a real fleet may have no known pose. `now_ms` is the time of this node (`System.monotonic_time/1`), by which the
+  robot of a real fleet may have no known pose, and `badges` are its conditions (`Console.Cli.Condition`). `now_ms` is the time of this node (`System.monotonic_time/1`), by which the
   page says when an order was given. Only robots of one `frame` are drawn together; `apart` says why one is not
   in that of most. `beside` is the scene of another run at the same time, if one is shown beside this one.
   """
-  @spec scene(Scene.t(), String.t() | nil, String.t() | nil, now_ms :: integer(), Scene.t() | nil) ::
+  @spec scene(Scene.t(), Pace.t() | nil, String.t() | nil, now_ms :: integer(), Scene.t() | nil) ::
           String.t()
   def scene(%Scene{} = scene, pace, notice, now_ms, beside \\ nil) do
     scene
     |> run()
-    |> Map.merge(%{t: "scene", now: now_ms, pace: pace, notice: notice})
-    |> Map.put(:beside, beside && run(beside))
+    |> Map.merge(%{t: "scene", now: now_ms, notice: notice, beside: beside && run(beside)})
+    |> Map.merge(pace(pace))
     |> Json.encode!()
   end
+
+  defp pace(pace) do
+    %{
+      pace: pace && Pace.words(pace),
+      speed: pace && speed(pace.speed),
+      paused: pace != nil and pace.left == 0
+    }
+  end
+
+  # As the page's list of speeds has it.
+  defp speed(:max), do: "max"
+  defp speed(speed), do: String.replace(Format.decimals(speed, 2), ~r/\.?0+$/, "")
 
   defp run(scene) do
     %{
@@ -92,12 +107,15 @@ defmodule Console.Page.State do
     Json.encode!(%{history | entries: entries} |> Map.put(:t, "history"))
   end
 
-  defp rounded(%{error: [_mean, _max] = error} = entry),
-    do: %{entry | error: Enum.map(error, &round3/1)}
-
-  defp rounded(entry), do: entry
+  defp rounded(entry) do
+    stages = Enum.map(entry.stages, &stage/1)
+    error = with [_mean, _max] = error <- entry[:error], do: Enum.map(error, &round3/1)
+    Map.merge(entry, %{stages: stages, error: error})
+  end
 
   defp robot(robot) do
+    conditions = Condition.of(robot)
+
     %{
       id: robot.id,
       x: robot.pose && round3(robot.pose.x),
@@ -113,15 +131,36 @@ defmodule Console.Page.State do
       leader: robot.leader?,
       follows: robot[:follows],
       frame: robot[:frame] || 0,
-      apart: robot[:apart]
+      apart: robot[:apart],
+      bars: Condition.bars(conditions),
+      badges:
+        for(c <- conditions, do: %{kind: c.kind, word: c.word, why: c.why, instead: c.instead?})
     }
   end
 
   defp shown(:estop), do: "E-STOP"
   defp shown(state), do: state
 
-  defp stage(stage),
-    do: %{at_s: stage.at_s, stage: stage.stage, line: Format.stage(stage), robot: stage[:robot]}
+  # A mesh has the time of day, and says itself what it tells of.
+  defp stage(stage) do
+    %{
+      at_s: stage.at_s,
+      time: stage[:clock] || Format.decimals(stage.at_s, 1) <> " s",
+      mark: stage.stage,
+      what: words(stage[:about] || stage.stage),
+      text: stage[:line] || Format.meaning(stage),
+      robot: stage[:robot],
+      ends: stage[:ends] || ended(stage.stage)
+    }
+  end
+
+  # What each stage ends, as the page's list says it.
+  defp ended(:estop_over), do: "estop holds"
+  defp ended(:world_back), do: "world lost"
+  defp ended(:radio_whole), do: "radio cut"
+  defp ended(_stage), do: nil
+
+  defp words(name), do: name |> to_string() |> String.replace("_", " ")
 
   defp point(nil), do: nil
   defp point({x, y}), do: [round3(x), round3(y)]
@@ -133,14 +172,15 @@ defmodule Console.Page.State do
   An answer to what was typed or clicked.
 
       iex> Console.Page.State.answer("kill mag1", {:ok, "done"})
-      ~S({"ok":true,"t":"answer","text":"kill mag1: done"})
+      ~S({"line":"kill mag1","ok":true,"t":"answer","text":"kill mag1: done"})
   """
   @spec answer(String.t(), {:ok, String.t() | [String.t()]} | {:error, String.t()}) :: String.t()
-  def answer(_line, {:ok, lines}) when is_list(lines),
-    do: Json.encode!(%{t: "answer", ok: true, text: Enum.join(lines, "\n")})
+  def answer(line, answer) do
+    {ok?, text} = answered(line, answer)
+    Json.encode!(%{t: "answer", line: line, ok: ok?, text: text})
+  end
 
-  def answer(line, {:ok, text}),
-    do: Json.encode!(%{t: "answer", ok: true, text: "#{line}: #{text}"})
-
-  def answer(_line, {:error, text}), do: Json.encode!(%{t: "answer", ok: false, text: text})
+  defp answered(_line, {:ok, lines}) when is_list(lines), do: {true, Enum.join(lines, "\n")}
+  defp answered(line, {:ok, text}), do: {true, "#{line}: #{text}"}
+  defp answered(_line, {:error, text}), do: {false, text}
 end

@@ -5,7 +5,7 @@ defmodule Console.Terminal.Session do
   # One process waits for keys or lines and for the time to draw; the fleet runs beside it. It
   # decides nothing: `Console.Terminal` draws, `Console.Prompt` checks, `Console.Orders` has
   # orders carried out.
-  alias Console.{Demo, Gamepad, Options, Orders, Page, Picture, Report, Teleop, Terminal}
+  alias Console.{Demo, Gamepad, Options, Orders, Pace, Page, Picture, Report, Teleop, Terminal}
   alias Console.Cli.{Format, Output}
   alias Console.Picture.RunTrack
   alias Console.Prompt
@@ -170,7 +170,8 @@ defmodule Console.Terminal.Session do
     receive do
       :draw ->
         scene = session.module.scene(live)
-        session = put_in(session.view.pace, session.module.pace(live))
+        pace = session.module.pace(live)
+        session = put_in(session.view.pace, pace && Pace.words(pace))
         session = %{session | scene: scene} |> draw(scene) |> tell(scene) |> track(scene)
 
         cond do

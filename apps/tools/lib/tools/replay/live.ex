@@ -21,7 +21,7 @@ defmodule Tools.Replay.Live do
   @part_ms 40
   @wait_ms 50
 
-  @enforce_keys [:names, :last_ms, :tracks, :due_ms]
+  @enforce_keys [:names, :runs, :last_ms, :tracks, :due_ms]
   defstruct @enforce_keys ++
               [
                 pace: Pace.new(),
@@ -52,6 +52,7 @@ defmodule Tools.Replay.Live do
 
     %__MODULE__{
       names: Recording.names(recording),
+      runs: Enum.map(recordings, &Path.basename(&1.file.path)),
       last_ms: recordings |> Enum.map(&Recording.last_ms/1) |> Enum.max(),
       tracks: tracks,
       due_ms: Clock.now_ms(),
@@ -148,7 +149,7 @@ defmodule Tools.Replay.Live do
   defp reply(:beside, %{tracks: [_one]} = state), do: {nil, state}
   defp reply(:beside, %{tracks: [_one, other]} = state), do: {shown(other), state}
 
-  defp reply(:pace, state), do: {"recording, #{words(state)}", state}
+  defp reply(:pace, state), do: {state.pace, state}
 
   defp reply({:history, after_count}, state) do
     entries = state.history |> Enum.take(max(state.noted - after_count, 0)) |> Enum.reverse()
@@ -157,6 +158,7 @@ defmodule Tools.Replay.Live do
        last_s: state.last_ms / 1000,
        known_s: known_ms(state) / 1000,
        playing: state.pace.left != 0,
+       names: state.runs,
        count: state.noted,
        entries: entries
      }, state}
@@ -178,15 +180,6 @@ defmodule Tools.Replay.Live do
     case word(text, state) do
       {:ok, said, state} -> {{:ok, said}, state}
       {:error, line} -> {{:error, line}, state}
-    end
-  end
-
-  defp words(%{pace: pace} = state) do
-    at = Format.seconds(Kind.at_ms(here(state).replay))
-
-    case Pace.words(pace) do
-      "paused" <> _then -> "paused at #{at} of #{Format.seconds(state.last_ms)}"
-      words -> words
     end
   end
 
@@ -379,16 +372,7 @@ defmodule Tools.Replay.Live do
       leader: scene.leader,
       formed: scene.formed?,
       held: scene.estop != nil,
-      stages:
-        for(
-          stage <- Scene.news(scene.stages, state.told),
-          do: %{
-            at_s: stage.at_s,
-            stage: stage.stage,
-            line: Format.stage(stage),
-            robot: stage[:robot]
-          }
-        )
+      stages: Scene.news(scene.stages, state.told)
     }
 
     %{

@@ -51,7 +51,8 @@ defmodule Console.Live.Mesh.View do
 
     lines =
       for({id, status} <- Enum.sort(present), line <- changes(view, id, status), do: {id, line}) ++
-        for id <- Enum.sort(MapSet.difference(gone, view.gone)), do: {id, "is no longer heard"}
+        for id <- Enum.sort(MapSet.difference(gone, view.gone)),
+            do: {id, {:heard, "is no longer heard", nil}}
 
     kept = Map.merge(view.statuses, present, fn _id, before, now -> known(before, now) end)
     order = view.order ++ (kept |> Map.keys() |> Enum.sort() |> Kernel.--(view.order))
@@ -76,23 +77,28 @@ defmodule Console.Live.Mesh.View do
   defp known(before, %Status{state: :no_answer}), do: %{before | state: :no_answer}
   defp known(before, now), do: %{now | body: now.body || before.body}
 
-  defp tell({id, line}, view, clock, at_ms) do
+  defp tell({id, {about, line, ends}}, view, clock, at_ms) do
     n = view.told + 1
     line = if String.starts_with?(line, "is "), do: "#{id} #{line}", else: "#{id}: #{line}"
-    stage = %{stage: :mesh, n: n, at_s: at_ms / 1000, clock: clock, robot: id, line: line}
+    stage = %{stage: :mesh, about: about, n: n, at_s: at_ms / 1000, clock: clock}
+    stage = Map.merge(stage, %{robot: id, line: line, ends: ends})
     %{view | told: n, stages: Enum.take(view.stages ++ [stage], -@most_stages)}
   end
 
   defp changes(view, id, status) do
     before = unless id in view.gone, do: view.statuses[id]
-    heard = if before, do: [], else: ["is heard"]
+    heard = if before, do: [], else: [{:heard, "is heard", nil}]
     status = if before, do: known(before, status), else: status
 
     heard ++
       for {{key, now, none}, {key, was, _none}} <- Enum.zip(facts(status), facts(before)),
           now != was,
-          do: now || none
+          do: if(now, do: {key, now, nil}, else: {key, none, name(key)})
   end
+
+  # What has ended is what was told before.
+  defp name(:state), do: nil
+  defp name(key), do: key |> to_string() |> String.replace("_", " ")
 
   # What is worth a line when it changes, as text, and what to say when there is no such thing any more.
   defp facts(nil), do: facts(%Status{robot: nil, state: nil})
@@ -170,11 +176,21 @@ defmodule Console.Live.Mesh.View do
       follows: if(status.leader != status.robot, do: status.leader),
       uncertainty: status.uncertainty,
       says: status.says,
+      blocked_by: status.blocked_by,
+      arming: arming(status),
+      offline: Enum.sort(for({device, {:offline, _reason}} <- status.health, do: device)),
+      crashed: status.crashed,
+      fault: status.fault,
+      lost: status.frame == :lost,
       size_ppm: nil,
       frame: frame,
       apart: apart
     }
   end
+
+  defp arming(%{arming: :disarmed, why: why}), do: {:disarmed, why}
+  defp arming(%{arming: {:error, _reason}, why: why}), do: {:line_lost, why}
+  defp arming(_status), do: nil
 
   # What keeps it from moving comes before what it would do.
   defp shown(%{estop: true}), do: :estop
