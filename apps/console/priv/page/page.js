@@ -124,7 +124,7 @@ function hear(message) {
   } else if (message.t === "scene") {
     tick(message.now);
     connected(true);
-    if (timeline.note(message)) show(message);
+    show(timeline.note(message));
   } else if (message.t === "history") timeline.history(message);
   else if (message.t === "about") told(message);
   else if (message.t === "answer") answer(message);
@@ -162,6 +162,7 @@ function show(next) {
   if (scene.beside) other.setScene(scene.beside);
   const fleet = by("fleet");
   const parts = [
+    timeline.past !== null && "looking back",
     scene.formation && `${scene.at_s.toFixed(1)} s`,
     scene.pace,
     scene.formation && `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
@@ -171,9 +172,11 @@ function show(next) {
   ];
   write(fleet, scene.notice ?? parts.filter(Boolean).join(" · "));
   fleet.className = scene.notice ? "lost" : "";
-  by("stop").hidden = scene.estop === null;
-  if (scene.estop !== null) write(by("held"), scene.estop);
-  controls(scene);
+  // Who looks back is told of a stop, and gives orders, now.
+  const now = timeline.newest ?? scene;
+  by("stop").hidden = now.estop === null;
+  if (now.estop !== null) write(by("held"), now.estop);
+  controls(now);
   robots.show(scene, chosen, floor.frame);
   leads(scene);
   apart(scene, floor.frame);

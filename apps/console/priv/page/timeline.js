@@ -80,7 +80,7 @@ export class Timeline {
     this.events = [];
     this.scenes = [];
     this.told = 0;
-    this.past = null; // the time that a person looks at instead of now
+    this.past = this.then = this.newest = null; // the time that a person looks at instead of now, and its scene
     this.run = recorded ? { last_s: 0, known_s: 0, playing: false } : null;
     this.robots = [];
     this.section.hidden = !recorded;
@@ -89,13 +89,13 @@ export class Timeline {
     this.draw();
   }
 
-  // Whether this scene is to be shown: not while a person looks at another time.
+  // Notes a scene, and returns the one that is to be shown: another while a person looks back.
   note(scene) {
     this.robots = scene.robots.map((r) => r.id);
     if (this.recorded) {
       this.at_s = scene.at_s;
       this.draw();
-      return true;
+      return scene;
     }
     const last = this.scenes.at(-1);
     if (last && scene.at_s < last.at_s) this.clear(false);
@@ -107,7 +107,7 @@ export class Timeline {
     this.newest = scene;
     this.section.hidden = this.scenes.length < 2;
     this.draw();
-    return this.past === null;
+    return this.past === null ? scene : this.then;
   }
 
   add(entries) {
@@ -157,10 +157,10 @@ export class Timeline {
 
   look(at_s) {
     this.past = at_s;
-    const scene = this.scenes.findLast((s) => s.at_s <= at_s + 0.001) ?? this.scenes[0];
+    this.then = this.scenes.findLast((s) => s.at_s <= at_s + 0.001) ?? this.scenes[0];
     this.now.hidden = false;
     this.on.past(true);
-    this.on.show(scene);
+    this.on.show(this.then);
     this.draw();
   }
 
@@ -319,9 +319,10 @@ export class Timeline {
   marks(c, low) {
     c.textAlign = "center";
     c.font = "12px system-ui, sans-serif";
+    const [from] = this.ends();
     for (const event of this.events) {
       const mark = MARKS[event.mark];
-      if (!mark) continue;
+      if (!mark || event.at_s < from) continue;
       c.fillStyle = ink(["✕", "■", "!"].includes(mark) ? "--bad" : mark === "▲" ? "--good" : "--text");
       c.strokeStyle = ink("--panel");
       c.lineWidth = 3;
