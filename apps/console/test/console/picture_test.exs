@@ -53,6 +53,34 @@ defmodule Console.PictureTest do
     assert count(document, "//text[.='plan known, noise off']") == 1
   end
 
+  test "a film moves every robot and the landmark, shows what happened from when it did, and ends in one line without a map" do
+    scenes = for at_s <- 0..70//2, do: Runs.scene("--move 3,2@30 --kill mag2@60", at_s)
+    {:ok, film} = Console.Picture.Film.draw(scenes, "6 robots & a title")
+    assert film == elem(Console.Picture.Film.draw(scenes, "6 robots & a title"), 1)
+    document = parse(film)
+    moves = "//animateTransform[@type='translate']"
+    # Six robots, the landmark, and the cursor of the plot.
+    assert count(document, moves) == 8
+    assert count(document, "//animateTransform[@type='rotate']") == 6
+    assert count(document, "//text[.='6 robots & a title']") == 1
+    # The one that dies fades.
+    assert count(document, "//animate[@attributeName='opacity']") == 1
+    assert count(document, "//text[.='mag2 is dead']") == 1
+
+    values =
+      for {:xmlAttribute, :values, _, _, _, _, _, _, values, _} <-
+            :xmerl_xpath.string(to_charlist(moves <> "/@values"), document),
+          do: values |> to_string() |> String.split(";") |> length()
+
+    assert Enum.frequencies(values) == %{2 => 1, length(scenes) => 7}
+
+    assert {:error, "a film needs a second of a run at least"} =
+             Console.Picture.Film.draw(Enum.take(scenes, 1), "")
+
+    assert {:error, "only a run in lockstep can be drawn: robots of processes know no map"} =
+             Console.Picture.Film.draw([%{hd(scenes) | map: nil}], "")
+  end
+
   test "round bodies are discs, and boxes are boxes" do
     document =
       "--fleet burger:1,mag:1,min:1 --landmark none --duration 5"

@@ -4,7 +4,8 @@ defmodule Tools.Replay do
   every decision is as recorded (`.Verdict`), how the fleet stood at a time (`.Moment`), compares two recordings, and goes
   through one tick by tick at a prompt (`.Session`) or in the browser (`.Live`).
   """
-  alias Console.Cli.{Format, Output}
+  alias Console.Cli.{Format, OutFile, Output}
+  alias Console.Picture.Film
 
   alias Tools.Replay.{
     Asked,
@@ -24,6 +25,8 @@ defmodule Tools.Replay do
 
   # So many differences are shown; the first ones explain the others.
   @shown 3
+  # From one scene of a film to the next.
+  @film_ms 500
 
   @doc """
   Runs the command, and returns its exit status: 0 if all is the same, 2 if something differs or
@@ -130,14 +133,16 @@ defmodule Tools.Replay do
   end
 
   defp replay(recording, options) do
-    with {:ok, tables} <- tables(options) do
+    with {:ok, tables} <- tables(options),
+         :ok <- OutFile.check("--film", options.film) do
       output = Output.to(:stdio)
+      replay = Recording.replay(recording, only(options))
       Output.line(output, Recording.heading(recording))
       asked_s = options.at_s || options.until_s
       until_ms = if asked_s, do: round(1_000 * asked_s), else: Recording.last_ms(recording)
 
       run = %{
-        replay: Recording.replay(recording, only(options)),
+        replay: replay,
         before: nil,
         tick: nil,
         told: 0,
@@ -147,7 +152,8 @@ defmodule Tools.Replay do
         output: output,
         until_ms: until_ms,
         quiet?: options.at_s != nil,
-        tables: tables
+        tables: tables,
+        film: options.film && [Kind.scene(replay)]
       }
 
       run =
@@ -163,7 +169,10 @@ defmodule Tools.Replay do
       compared = Kind.compared(replay)
       verdict = Verdict.lines(compared, Kind.at_ms(replay), run.shown, run.count)
       Enum.each(verdict, &IO.puts/1)
-      with :ok <- close(run.tables), do: Verdict.status(compared, run.count)
+
+      with :ok <- close(run.tables),
+           :ok <- film(run.film, recording, options),
+           do: Verdict.status(compared, run.count)
     end
   end
 
@@ -183,7 +192,27 @@ defmodule Tools.Replay do
   defp step(tick, run) do
     {replay, differences} = Kind.step(run.replay, tick)
     run = differs(%{run | replay: replay, before: run.replay, tick: tick}, differences)
-    run |> tabulate() |> draw() |> tell()
+    run |> tabulate() |> picture() |> draw() |> tell()
+  end
+
+  defp picture(%{film: nil} = run), do: run
+
+  defp picture(%{replay: replay} = run) do
+    if rem(Kind.at_ms(replay), @film_ms) == 0,
+      do: %{run | film: [Kind.scene(replay) | run.film]},
+      else: run
+  end
+
+  defp film(nil, _recording, _options), do: :ok
+
+  defp film(scenes, recording, options) do
+    with {:ok, film} <- Film.draw(Enum.reverse(scenes), recording.about),
+         :ok <- OutFile.write("--film", options.film, film) do
+      IO.puts("Wrote #{options.film}")
+    else
+      {:error, "--film" <> _ = line} -> {:error, line}
+      {:error, line} -> {:error, "--film: #{line}"}
+    end
   end
 
   defp differs(run, differences) do

@@ -175,8 +175,10 @@ defmodule Console.Picture.Floor do
     [crown, body(robot, at, scale, fill: colour, stroke: "#FFFFFF", stroke_width: 1.2)]
   end
 
-  # A disc or a box to scale, with a stroke from the middle between its wheels to its front.
-  defp body(robot, at, scale, look) do
+  @doc "A disc or a box to scale, with a stroke from the middle between its wheels to its front; `at` gives the pixels of its place."
+  @spec body(Sim.Scene.robot(), (Pose.point() -> {float(), float()}), float(), keyword()) ::
+          iodata()
+  def body(robot, at, scale, look) do
     {x, y} = at.(Pose.point(robot.pose))
     r = Colours.size(robot, scale)
     heading = robot.pose.heading

@@ -13,6 +13,8 @@ defmodule Console.Picture.Plot do
   @marks [0, 0.1, 0.5, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512]
   # Of a curve, at most so many points are drawn.
   @most 1_500
+  # Two errors that are farther apart are of two leaders.
+  @gap_s 0.75
 
   @doc """
   The plot in a field of this size, with its upper left corner at 0,0; axis labels are outside.
@@ -166,7 +168,7 @@ defmodule Console.Picture.Plot do
   defp chunk(error, []), do: {:cont, [error]}
 
   defp chunk({at_s, _, _} = error, [{last_s, _, _} | _] = part) do
-    if at_s - last_s > 0.25, do: {:cont, part, [error]}, else: {:cont, [error | part]}
+    if at_s - last_s > @gap_s, do: {:cont, part, [error]}, else: {:cont, [error | part]}
   end
 
   # Of neighbours the worst is drawn, so that no peak is missing.

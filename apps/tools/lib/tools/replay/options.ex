@@ -11,6 +11,7 @@ defmodule Tools.Replay.Options do
             csv: nil,
             step: false,
             page: false,
+            film: nil,
             help: false
 
   @type t :: %__MODULE__{
@@ -23,6 +24,7 @@ defmodule Tools.Replay.Options do
           csv: Path.t() | nil,
           step: boolean(),
           page: boolean(),
+          film: Path.t() | nil,
           help: boolean()
         }
 
@@ -56,7 +58,7 @@ defmodule Tools.Replay.Options do
 
   # A prompt and a page go by themselves; the others go through all of a run.
   defp alone(options) do
-    through = [until: options.until_s, csv: options.csv]
+    through = [until: options.until_s, csv: options.csv, film: options.film]
 
     step =
       if options.step, do: [page: options.page, against: options.against] ++ through, else: []
@@ -91,6 +93,7 @@ defmodule Tools.Replay.Options do
       mix replay run.mcap --page                               in the browser: play, pause, choose a robot, read why
       mix replay run.mcap --against other.mcap                 where two runs part
       mix replay run.mcap --against other.mcap --page          both side by side
+      mix replay run.mcap --film run.svg                       an animation that any browser shows
       mix replay run.mcap --csv tables                         for a spreadsheet, or pandas
 
     Exit status: 0 all is the same; 2 something differs, or could not be compared because it was
@@ -109,6 +112,8 @@ defmodule Tools.Replay.Options do
        "compare with another recording: the first tick that differs, and in what"},
       {"step", nil, nil, "go forwards and backwards tick by tick, and ask: a prompt"},
       {"page", nil, nil, "show it in the browser, with a strip of time"},
+      {"film", "FILE.svg", &file(&1, folder),
+       "draw the run as an animation, for a README or a talk"},
       {"csv", "DIR", &Parse.folder(&1, folder),
        "write poses, errors, messages, ticks and events as tables"}
     ]
