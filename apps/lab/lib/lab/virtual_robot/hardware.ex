@@ -126,12 +126,21 @@ defmodule Lab.VirtualRobot.Hardware do
   @doc "Where their serial lines are, for people, one line per robot."
   @spec lines([robot()], Path.t()) :: [String.t()]
   def lines(robots, folder) do
-    for %{hardware?: true, profile: profile} = robot <- robots do
-      head = if head?(profile), do: ", its camera's head on #{link(folder, robot, "camera")}"
-      model = with %{model: model} <- profile.scan, do: model
-      lidar = if model, do: ", its lidar on #{link(folder, robot, "scan")}"
-      "#{robot.id} has real drivers: its base on #{link(folder, robot, "base")}#{head}#{lidar}"
+    words = %{"base" => "its base", "camera" => "its camera's head", "scan" => "its lidar"}
+
+    for %{hardware?: true} = robot <- robots do
+      lines = for {what, link} <- links(robot, folder), do: "#{words[what]} on #{link}"
+      "#{robot.id} has real drivers: #{Enum.join(lines, ", ")}"
     end
+  end
+
+  @doc "The links to the lines of such a robot: `base`, and `camera` and `scan` where it has them."
+  @spec links(robot(), Path.t()) :: [{what :: String.t(), Path.t()}]
+  def links(%{profile: profile} = robot, folder) do
+    lidar? = match?(%{model: model} when model != nil, profile.scan)
+
+    for {what, true} <- [{"base", true}, {"camera", head?(profile)}, {"scan", lidar?}],
+        do: {what, link(folder, robot, what)}
   end
 
   # From the fact sheet, as in the file of such a robot.
