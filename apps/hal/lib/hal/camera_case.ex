@@ -35,28 +35,12 @@ defmodule Hal.CameraCase do
   @doc "Which scene this is, by a frame or by the detections of a camera that detects by itself; `nil` if neither."
   @callback scene(picture :: struct()) :: 0 | 1 | nil
 
-  @rules [
-    :options,
-    :missing,
-    :pictures,
-    :sees,
-    :newest,
-    :junk,
-    :messages,
-    :unplug,
-    :restart,
-    :program,
-    :close,
-    :killed
-  ]
-  @table [
-    only: [{:list, {:one_of, @rules}}, default: @rules],
-    size: [{:check, &__MODULE__.size?/1, "{width, height}"}, default: nil],
-    format: [{:one_of, Frame.formats()}, default: nil],
-    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 300_000],
-    seed: [:integer, default: 1]
-  ]
+  @rules DeviceCase.rules([:pictures, :sees, :newest])
+  @table DeviceCase.table(@rules, 300_000) ++
+           [
+             size: [{:check, &__MODULE__.size?/1, "{width, height}"}, default: nil],
+             format: [{:one_of, Frame.formats()}, default: nil]
+           ]
   @pictures 10
   # Within so many pictures it shows what is before it.
   @tries 100
@@ -67,9 +51,6 @@ defmodule Hal.CameraCase do
   # What a device may have in its mailbox then, and how many pictures of before may come after.
   @queued 5
   @behind 3
-
-  @enforce_keys [:driver, :emulated, :options]
-  defstruct @enforce_keys ++ [kind: :camera, link: nil, ref: nil, pid: nil, device: nil]
 
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `size` (`{width, height}`) and `format` of its frames (not judged
@@ -83,11 +64,8 @@ defmodule Hal.CameraCase do
         ) :: [String.t()]
   def problems({_, _} = driver, {_, _} = camera, options \\ []) do
     options = Options.check!(options, @table, "camera case")
-
-    DeviceCase.problems(
-      %__MODULE__{driver: driver, emulated: camera, options: options},
-      &rule/2
-    )
+    t = %DeviceCase{kind: :camera, driver: driver, emulated: camera, options: options}
+    DeviceCase.problems(t, &rule/2)
   end
 
   @doc false

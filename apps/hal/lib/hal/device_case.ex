@@ -3,15 +3,21 @@ defmodule Hal.DeviceCase do
   # What the kits for drivers share (`Hal.DriveCase`, `Hal.ScanCase`, `Hal.CameraCase`, `Hal.PtzCase`): a device and the
   # emulated other end of its line for the time of one rule, what is heard of it, and the rules that hold for devices of
   # any kind.
-  alias Hal.{Clock, Device}
+  alias Hal.{Clock, Device, Options}
 
   @noise 40
   @chunk 500
   @hold_ms 500
   @look_ms 20
 
+  @first [:options, :missing]
+  @last [:junk, :messages, :unplug, :restart, :program, :close, :killed]
+
+  @enforce_keys [:kind, :driver, :emulated, :options]
+  defstruct @enforce_keys ++ [link: nil, ref: nil, pid: nil, device: nil]
+
   @typedoc """
-  One run of a rule, the struct of a kit. A driver's options may be a function of the link; those in a list get it as
+  One run of a rule, this struct or that of a kit which has more. A driver's options may be a function of the link; those in a list get it as
   `port:`. `options` are those of the kit, among them `only`, `wait_ms`, `bytes` and `seed`; `ref` marks what is heard, `pid` is
   the emulated device.
   """
@@ -32,6 +38,21 @@ defmodule Hal.DeviceCase do
   words say when this is, for the line.
   """
   @type works :: (t(), pos_integer(), String.t() -> :ok | {:error, String.t()})
+
+  @doc "All rules of a kit that has these of its own."
+  @spec rules([atom()]) :: [atom()]
+  def rules(own), do: @first ++ own ++ @last
+
+  @doc "The options that all kits have; so many bytes may a device's state have unless told otherwise."
+  @spec table([atom()], pos_integer()) :: Options.table()
+  def table(rules, bytes) do
+    [
+      only: [{:list, {:one_of, rules}}, default: rules],
+      wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
+      bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: bytes],
+      seed: [:integer, default: 1]
+    ]
+  end
 
   @doc "What does not hold of the rules that are asked for, one line each."
   @spec problems(t(), (rule :: atom(), t() -> result())) :: [String.t()]

@@ -53,15 +53,12 @@ defmodule Hal.DriveCase do
     :unplug,
     :restart
   ]
-  @table [
-    only: [{:list, {:one_of, @rules}}, default: @rules],
-    max_linear: [{:number, 0.01, 10, "m/s"}, default: 0.5],
-    max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
-    sonar: [:boolean, default: false],
-    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 60_000],
-    seed: [:integer, default: 1]
-  ]
+  @table DeviceCase.table(@rules, 60_000) ++
+           [
+             max_linear: [{:number, 0.01, 10, "m/s"}, default: 0.5],
+             max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
+             sonar: [:boolean, default: false]
+           ]
 
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `max_linear` and `max_turn` (what the driver's options

@@ -25,31 +25,12 @@ defmodule Hal.PtzCase do
   alias Hal.{Device, DeviceCase, Options}
   import Hal.DeviceCase, only: [await: 3, on_emulated: 3]
 
-  @rules [
-    :options,
-    :missing,
-    :looks,
-    :junk,
-    :messages,
-    :unplug,
-    :restart,
-    :program,
-    :close,
-    :killed
-  ]
-  @table [
-    only: [{:list, {:one_of, @rules}}, default: @rules],
-    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 60_000],
-    seed: [:integer, default: 1]
-  ]
+  @rules DeviceCase.rules([:looks])
+  @table DeviceCase.table(@rules, 60_000)
   # Where it is told to look, and how exactly it must, in radians.
   @pan 0.3
   @tilt 0.1
   @exact 0.02
-
-  @enforce_keys [:driver, :emulated, :options]
-  defstruct @enforce_keys ++ [kind: :ptz, link: nil, ref: nil, pid: nil, device: nil]
 
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `wait_ms` (how long a busy machine may take for what must come,
@@ -60,7 +41,7 @@ defmodule Hal.PtzCase do
           [String.t()]
   def problems({_, _} = driver, {_, _} = unit, options \\ []) do
     options = Options.check!(options, @table, "ptz case")
-    t = %__MODULE__{driver: driver, emulated: unit, options: options}
+    t = %DeviceCase{kind: :ptz, driver: driver, emulated: unit, options: options}
     DeviceCase.problems(t, &rule/2)
   end
 

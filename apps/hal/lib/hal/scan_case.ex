@@ -29,33 +29,13 @@ defmodule Hal.ScanCase do
   @doc "What the lidar has around it from now on."
   @callback see(GenServer.server(), Scan.t()) :: :ok
 
-  @rules [
-    :options,
-    :missing,
-    :sees,
-    :turned,
-    :junk,
-    :messages,
-    :unplug,
-    :restart,
-    :program,
-    :close,
-    :killed
-  ]
-  @table [
-    only: [{:list, {:one_of, @rules}}, default: @rules],
-    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 300_000],
-    seed: [:integer, default: 1]
-  ]
+  @rules DeviceCase.rules([:sees, :turned])
+  @table DeviceCase.table(@rules, 300_000)
   @degree :math.pi() / 180
   # What is seen is as far away as this (metres), and so wide to each side (degrees).
   @near 0.8
   @wide 5
   @exact 0.05
-
-  @enforce_keys [:driver, :emulated, :options]
-  defstruct @enforce_keys ++ [kind: :scan, link: nil, ref: nil, pid: nil, device: nil]
 
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `wait_ms` (how long a busy machine may take for what must come,
@@ -66,11 +46,8 @@ defmodule Hal.ScanCase do
           [String.t()]
   def problems({_, _} = driver, {_, _} = lidar, options \\ []) do
     options = Options.check!(options, @table, "scan case")
-
-    DeviceCase.problems(
-      %__MODULE__{driver: driver, emulated: lidar, options: options},
-      &rule/2
-    )
+    t = %DeviceCase{kind: :scan, driver: driver, emulated: lidar, options: options}
+    DeviceCase.problems(t, &rule/2)
   end
 
   defp rule(:sees, t), do: on_emulated(t, [], &sees(&1, 0, "what is ahead"))

@@ -54,7 +54,7 @@ defmodule Swarm.Comms.JoystickTest do
              ])
   end
 
-  # Says ten times a second what the stick says, until another word of the test comes.
+  # Says ten times a second what the stick says, which the returned function changes; first that its button is up.
   defp held(id) do
     hand =
       start_supervised!(
@@ -75,6 +75,10 @@ defmodule Swarm.Comms.JoystickTest do
        end},
       id: {:says, id}
     )
+
+    eventually(fn ->
+      match?({:ok, %{held?: false}, _}, Board.fetch(Board.find!(id), :joystick, 300))
+    end)
 
     fn reading -> Agent.update(hand, fn _before -> reading end) end
   end
@@ -109,10 +113,6 @@ defmodule Swarm.Comms.JoystickTest do
     standing([id])
     hand = held(id)
 
-    eventually(fn ->
-      match?({:ok, %{held?: false}, _}, Board.fetch(Board.find!(id), :joystick, 300))
-    end)
-
     hand.(stick(0.3, 0, true))
     drives(id)
     hand.(stick(0.3, 0, false))
@@ -132,10 +132,6 @@ defmodule Swarm.Comms.JoystickTest do
     standing([id])
     hand = held(id)
     listen(id, [:swarm, :comms, :joystick])
-
-    eventually(fn ->
-      match?({:ok, %{held?: false}, _}, Board.fetch(Board.find!(id), :joystick, 300))
-    end)
 
     hand.(stick(0.3, 0, true))
     assert_receive {[:swarm, :comms, :joystick], %{line: line}}, 10_000
@@ -158,10 +154,6 @@ defmodule Swarm.Comms.JoystickTest do
     standing([id])
     hand = held(id)
     listen(id, [:swarm, :comms, :joystick])
-
-    eventually(fn ->
-      match?({:ok, %{held?: false}, _}, Board.fetch(Board.find!(id), :joystick, 300))
-    end)
 
     assert {:error, _needs_a_person} = Swarm.tell(id, "move:0.2:0")
     hand.(stick(0.3, 0, true))
