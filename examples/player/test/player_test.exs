@@ -121,7 +121,8 @@ defmodule PlayerTest do
 
     assert result.left == [
              {16, "sonar_2nd_bank_start", "all sonars are one list here"},
-             {20, "rflex_joy_pos_ratio", "the joystick is read, but drives nothing by itself"},
+             {20, "rflex_joy_pos_ratio",
+              "is part of joystick_ratios: of the drive, {m/s, rad/s} a count"},
              {21, "odo_distence_conversion",
               "is not an option of rflex; did you mean odo_distance_conversion?"},
              {26, "driver festival", "speech is not supported"},

@@ -12,7 +12,8 @@ defmodule Hal.Drive do
   @typedoc """
   A reading. Ranges are in metres, in the order of the profile's sensor poses; without an echo a
   range is the profile's greatest. Bumpers are the pressed segments, counted counter-clockwise
-  from the front. Power is in volts. `:home` reports a switch at one absolute heading, as the
+  from the front. Power is in volts. `:joystick` is the base's own: the speed to which it points, and whether its dead man's
+  button is held; such readings come only while a person wants to drive by it. `:home` reports a switch at one absolute heading, as the
   heading of odometry there. Not every base has a brake, a joystick or such a switch; a receiver
   ignores readings that it does not know.
 
@@ -31,7 +32,7 @@ defmodule Hal.Drive do
           | {:bumpers, [0..15]}
           | {:power, float()}
           | {:brake, boolean()}
-          | {:joystick, %{x: integer(), y: integer(), buttons: byte()}}
+          | {:joystick, %{twist: Hal.Twist.t(), held?: boolean()}}
           | {:home, heading :: float()}
           | {:report, :wheels | :sonar}
           | {:refused, request :: atom(), line :: String.t()}

@@ -29,7 +29,8 @@ defmodule Hal.DriveCase do
   | `:unplug` | a pulled cable is an error; once it is back the wheels stand until a person has acknowledged and armed |
   | `:restart` | a base that is switched off and on is found again, and odometry does not jump in one frame |
   """
-  alias Hal.{Device, Options, Twist}
+  alias Hal.{Device, DeviceCase, Options, Twist}
+  import Hal.DeviceCase, only: [one_line: 2, tell: 2, words: 2]
   import Hal.DriveCase.Run
 
   @doc "The speed that the base gives its wheels now."
@@ -52,15 +53,12 @@ defmodule Hal.DriveCase do
     :unplug,
     :restart
   ]
-  @table [
-    only: [{:list, {:one_of, @rules}}, default: @rules],
-    max_linear: [{:number, 0.01, 10, "m/s"}, default: 0.5],
-    max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
-    sonar: [:boolean, default: false],
-    wait_ms: [{:integer, 1_000, 600_000, "ms"}, default: 20_000],
-    bytes: [{:integer, 1, 1_000_000_000, "bytes"}, default: 60_000],
-    seed: [:integer, default: 1]
-  ]
+  @table DeviceCase.table(@rules, 60_000) ++
+           [
+             max_linear: [{:number, 0.01, 10, "m/s"}, default: 0.5],
+             max_turn: [{:number, 0.01, 10, "rad/s"}, default: 1.0],
+             sonar: [:boolean, default: false]
+           ]
 
   @doc """
   What does not hold, one line each. Options: `only` (these rules), `max_linear` and `max_turn` (what the driver's options
@@ -69,34 +67,26 @@ defmodule Hal.DriveCase do
   """
   @spec problems(driver :: {module(), keyword()}, base :: {module(), keyword()}, keyword()) ::
           [String.t()]
-  def problems({driver, driver_options}, {base, base_options}, options \\ []) do
+  def problems({_, _} = driver, {_, _} = base, options \\ []) do
     options = Options.check!(options, @table, "drive case")
     linear = min(options[:max_linear] / 2, 0.2)
     turn = min(options[:max_turn] / 2, 0.5)
 
-    case = %Hal.DriveCase.Run{
-      driver: driver,
-      driver_options: driver_options,
-      base: base,
-      base_options: base_options,
-      options: options,
-      speed: {linear, turn}
-    }
-
-    for rule <- options[:only],
-        {:error, line} <- [within_folder(case, &rule(rule, &1))],
-        do: "#{rule}: #{line}"
+    DeviceCase.problems(
+      %Hal.DriveCase.Run{
+        driver: driver,
+        emulated: base,
+        options: options,
+        speed: {linear, turn}
+      },
+      &rule/2
+    )
   end
 
-  defp rule(:options, t) do
-    case refusal(t, no_such_option: 1) do
-      {:ok, line} -> one_line(line, "no_such_option")
-      :none -> {:error, "no_such_option: 1 is not refused by its init/1 (`ArgumentError`)"}
-    end
-  end
+  defp rule(:options, t), do: DeviceCase.refuses(t)
 
   defp rule(:missing, t) do
-    with_device(t, :auto, fn t ->
+    DeviceCase.with_device(t, device(t, :auto), fn t ->
       with {:ok, t} <-
              await(t, "is not offline, and has no port", &match?({:offline, _}, health(&1))) do
         {:offline, reason} = health(t)
@@ -154,7 +144,7 @@ defmodule Hal.DriveCase do
   defp rule(:close, t) do
     on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t) do
-        close(t.device)
+        DeviceCase.close(t.device)
         stands(order(t, nil), "the end of its device")
       end
     end)
@@ -171,8 +161,8 @@ defmodule Hal.DriveCase do
 
   defp rule(:program, t) do
     on_base(t, :auto, fn t ->
-      with {:ok, t} <- rolls(t), [_ | _] = programs <- programs(t) do
-        for program <- programs, do: {_out, 0} = System.cmd("kill", ["-KILL", "#{program}"])
+      with {:ok, t} <- rolls(t), [_ | _] = programs <- DeviceCase.programs(t) do
+        DeviceCase.kill(programs)
 
         with {:ok, t} <- stands(order(t, nil), "the killing of its port program"),
              {:ok, t} <- online(t),
@@ -191,7 +181,7 @@ defmodule Hal.DriveCase do
            {:ok, t} <- alive(t, "noise on the line"),
            {:ok, t} <- online(t),
            {:ok, t} <- rolls(t),
-           do: small(t)
+           do: DeviceCase.small(t)
     end)
   end
 
@@ -223,10 +213,10 @@ defmodule Hal.DriveCase do
     on_base(t, :manual, fn t ->
       with {:ok, t} <- armed(t),
            {:ok, t} <- rolls(t),
-           :ok <- t.base.unplug(t.pid),
+           :ok <- tell(t, :unplug),
            {:ok, t} <-
              await(t, "is not offline, and has no cable", &match?({:offline, _}, health(&1))),
-           :ok <- t.base.plug(t.pid),
+           :ok <- tell(t, :plug),
            {:ok, t} <- online(t),
            {:ok, t} <- stands(t, "its cable being back"),
            {:ok, t} <- hold(t, "moves although its line was lost", &standing?/1),
@@ -245,7 +235,7 @@ defmodule Hal.DriveCase do
   defp rule(:restart, t) do
     on_base(t, :auto, fn t ->
       with {:ok, t} <- rolls(t),
-           :ok <- t.base.restart(t.pid),
+           :ok <- tell(t, :restart),
            {:ok, t} <- hold(t, "", fn _t -> true end),
            {:ok, t} <- online(t),
            {:ok, t} <- rolls(t),
@@ -257,10 +247,12 @@ defmodule Hal.DriveCase do
   # Steps of the rules: `{:ok, t}`, or `{:error, line}`.
 
   defp on_base(t, arm, rule) do
-    with_base(t, arm, fn t ->
+    DeviceCase.on_emulated(t, device(t, arm), fn t ->
       with {:ok, t} <- online(t), do: rule.(t)
     end)
   end
+
+  defp device(t, arm), do: [arm: arm, sonar: t.options[:sonar]]
 
   defp forwards(%{speed: {linear, _turn}}), do: Twist.new(linear, 0)
 
@@ -283,45 +275,9 @@ defmodule Hal.DriveCase do
   defp armed(t), do: await(t, "cannot be armed", fn t -> Device.arm(t.device) == :ok end)
 
   defp alive(t, after_what) do
-    if Process.alive?(t.device), do: {:ok, t}, else: {:error, "ends after #{after_what}"}
+    with :ok <- DeviceCase.alive(t, after_what), do: {:ok, t}
   end
 
   defp unjumped(%{jumped?: true}), do: {:error, "its odometry jumps within one frame"}
   defp unjumped(t), do: {:ok, t}
-
-  # Binaries count, too.
-  defp small(t) do
-    size = t.device |> :sys.get_state() |> :erlang.external_size()
-
-    if size > t.options[:bytes],
-      do: {:error, "its state has #{size} bytes after noise"},
-      else: {:ok, t}
-  end
-
-  # The programs of the device's ports.
-  defp programs(t) do
-    {:links, links} = Process.info(t.device, :links)
-    for port <- links, is_port(port), {:os_pid, pid} <- [Port.info(port, :os_pid)], do: pid
-  end
-
-  defp refusal(t, wrong) do
-    with {:ok, state} <- t.driver.init([port: t.link] ++ wrong ++ t.driver_options),
-         do: t.driver.terminate(state)
-
-    :none
-  rescue
-    refused in ArgumentError -> {:ok, Exception.message(refused)}
-  end
-
-  defp words(t, reason) do
-    if function_exported?(t.driver, :explain, 2),
-      do: t.driver.explain(reason, [port: t.link] ++ t.driver_options),
-      else: "#{inspect(reason)}, because it has no explain/2"
-  end
-
-  defp one_line(line, named) do
-    if String.contains?(line, "\n") or not String.contains?(line, named),
-      do: {:error, "expected one line that names #{named}, got #{inspect(line)}"},
-      else: :ok
-  end
 end

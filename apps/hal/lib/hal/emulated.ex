@@ -1,6 +1,7 @@
 defmodule Hal.Emulated do
   @moduledoc """
-  Defines the device at the other end of a line, as `Hal.DriveCase` and `Hal.ScanCase` use it; `Sim.Emulator` is one.
+  Defines the device at the other end of a line, as `Hal.DriveCase`, `Hal.ScanCase`, `Hal.CameraCase` and `Hal.PtzCase` use it;
+  `Sim.Emulator` is one.
   """
 
   @doc "Starts a device at the other end of a line, whose link (`link:`) the kit adds to these options."

@@ -33,7 +33,7 @@ defmodule Robot.BoardTest do
     board = board(:board3)
     Board.sense(board, :drive, {:power, 24.0})
     # What real bases say besides.
-    for reading <- [brake: true, joystick: %{x: 0, y: -3, buttons: 1}, home: 1.5],
+    for reading <- [brake: true, joystick: %{twist: Hal.Twist.zero(), held?: true}, home: 1.5],
         do: Board.sense(board, :drive, reading)
 
     assert {:ok, 1.5, _now} = Board.fetch(board, :home, 1_000)

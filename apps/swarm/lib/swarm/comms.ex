@@ -21,7 +21,7 @@ defmodule Swarm.Comms do
   | `{:result, {:delivered, command, ref}, outcome}` | pilot or executive, which an order has reached |
   | `{:rival, identity, comms}` | another robot of this name |
   | `:stop` | the e-stop, which has changed |
-  | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`) |
+  | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`), among it the base's own joystick, whose word is an order of a person (`Swarm.Comms.Joystick`) |
 
   `join/2` makes a config with this role. Its options:
 
@@ -32,7 +32,7 @@ defmodule Swarm.Comms do
   alias Robot.{Board, Host, Names, Role}
   alias Robot.Mission.{Claim, Letter}
   alias Swarm.{Blackboard, Directory, EStop, Message, Replacement, Transport, Wire}
-  alias Swarm.Comms.{CommandHandler, NameClaim, OwnHeartbeat}
+  alias Swarm.Comms.{CommandHandler, Joystick, NameClaim, OwnHeartbeat}
   alias Swarm.Discovery.RobotInfo
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.{Checked, Receiver}
@@ -47,7 +47,16 @@ defmodule Swarm.Comms do
 
   @enforce_keys [:config, :receiver, :name, :held]
   defstruct @enforce_keys ++
-              [gone: [], noted: nil, ticks: 0, sequence: 0, beat_ms: nil, urgent: 0, sent: 0]
+              [
+                gone: [],
+                noted: nil,
+                ticks: 0,
+                sequence: 0,
+                beat_ms: nil,
+                urgent: 0,
+                sent: 0,
+                joystick: %Joystick{}
+              ]
 
   @typedoc """
   `receiver` holds what was heard; of the peers, `gone` are shown as gone. `sequence` is the number of its last heartbeat, at
@@ -65,14 +74,20 @@ defmodule Swarm.Comms do
           sequence: non_neg_integer(),
           beat_ms: integer() | nil,
           urgent: non_neg_integer(),
-          sent: non_neg_integer()
+          sent: non_neg_integer(),
+          joystick: Joystick.t()
         }
 
   @typedoc """
   What the process sees at a tick: what the blackboard should have of the robot, `nil` without one, and whether another robot
-  has the name that this one gave up.
+  has the name that this one gave up; and what was heard of the base's own joystick, with the time now
+  (`System.monotonic_time/1`, microseconds), where it was heard of late.
   """
-  @type seen :: %{about: RobotInfo.seen() | nil, taken?: boolean()}
+  @type seen :: %{
+          required(:about) => RobotInfo.seen() | nil,
+          required(:taken?) => boolean(),
+          optional(:joystick) => {Joystick.heard(), now_us :: integer()}
+        }
 
   @doc """
   Adds to the config of a robot this role, through which its mission sends messages, and the
@@ -195,9 +210,18 @@ defmodule Swarm.Comms do
   defp malformed, do: {:rejected, :not_a_message, 1}
 
   @impl Role
-  def perceive(_at_ms, s, board) do
+  def perceive(at_ms, s, board) do
     taken? = s.name.left? and Directory.members({:robot, s.config.id}) != []
-    {:tick, %{about: RobotInfo.seen(board), taken?: taken?}}
+    seen = %{about: RobotInfo.seen(board), taken?: taken?}
+
+    case Board.fetch(board, :joystick, Joystick.word_ms(), at_ms) do
+      {:ok, reading, heard_ms} ->
+        heard = {{reading, heard_ms}, System.monotonic_time(:microsecond)}
+        {:tick, Map.put(seen, :joystick, heard)}
+
+      :error ->
+        {:tick, seen}
+    end
   end
 
   @impl Role
@@ -218,7 +242,8 @@ defmodule Swarm.Comms do
     due? = s.urgent > 0 or Heartbeat.due?(s.beat_ms, at_ms)
     {s, beats} = if due?, do: beat(s, at_ms, board), else: {s, []}
     {s, rivals} = rivals(%{s | urgent: max(s.urgent - 1, 0)}, seen, at_ms)
-    {s, noted ++ shown ++ [{:put, :radio, counts}] ++ forwarded ++ beats ++ rivals}
+    {s, driven} = drive(s, seen[:joystick], at_ms, board)
+    {s, noted ++ shown ++ [{:put, :radio, counts}] ++ forwarded ++ beats ++ rivals ++ driven}
   end
 
   def handle({:cast, {:say, to, message}}, _at_ms, %{config: %{id: id}} = s, _board) do
@@ -345,6 +370,36 @@ defmodule Swarm.Comms do
   end
 
   defp rivals(s, _seen, _at_ms), do: {s, []}
+
+  defp drive(s, nil, at_ms, _board) do
+    {nil, joystick} = Joystick.word(s.joystick, nil, at_ms)
+    {%{s | joystick: joystick}, []}
+  end
+
+  # The word of its joystick comes to the same door as those of other people, and is as old as the joystick's reading.
+  defp drive(s, {{_reading, heard_ms} = heard, now_us}, at_ms, board) do
+    {word, joystick} = Joystick.word(s.joystick, heard, at_ms)
+    s = %{s | joystick: joystick}
+    age_ms = max(at_ms - heard_ms, 0)
+    order = {s.config.boot, now_us - 1_000 * age_ms}
+
+    if word do
+      {s, effects} = handle({:cast, {:command, word, nil, order, now_us}}, at_ms, s, board)
+      {told, s} = Enum.flat_map_reduce(effects, s, &told/2)
+      {s, [{:cast, :gate, {:present, age_ms}} | told]}
+    else
+      {s, []}
+    end
+  end
+
+  # No person waits for the answer to a joystick, so what is refused is an event.
+  defp told({:reply, nil, {:error, line}}, s) do
+    {news?, joystick} = Joystick.refused(s.joystick, line)
+    told = if news?, do: [{:event, [:swarm, :comms, :joystick], %{line: line}}], else: []
+    {told, %{s | joystick: joystick}}
+  end
+
+  defp told(effect, s), do: {[effect], s}
 
   # A sender that knows only this process reaches the e-stop through it.
   defp command(request, {ref, asked_us, _now_us} = given, order, s, at_ms, board) do

@@ -79,8 +79,8 @@ defmodule Player.RFlexOptions do
   @reasons %{
     "sonar_2nd_bank_start" => "all sonars are one list here",
     "sonar_max_range" => "a sonar sees as far as the body's sonar_max says",
-    "rflex_joy_pos_ratio" => "the joystick is read, but drives nothing by itself",
-    "rflex_joy_ang_ratio" => "the joystick is read, but drives nothing by itself",
+    "rflex_joy_pos_ratio" => "is part of joystick_ratios: of the drive, {m/s, rad/s} a count",
+    "rflex_joy_ang_ratio" => "is part of joystick_ratios: of the drive, {m/s, rad/s} a count",
     "rflex_home_on_start" => "no robot turns by itself when it is switched on"
   }
   @known ~w(rflex_serial_port mm_length m_length mm_width m_width odo_distance_conversion

@@ -1,7 +1,7 @@
 defmodule Hal.DriveCase.Run do
   @moduledoc false
   # One run of a rule of `Hal.DriveCase`: a base and a device on a line of their own, what is ordered, and what is heard.
-  alias Hal.{Device, Pose, Twist}
+  alias Hal.{Device, DeviceCase, Pose, Twist}
 
   # Slower than this the wheels stand, m/s and rad/s.
   @stands 0.005
@@ -11,10 +11,13 @@ defmodule Hal.DriveCase.Run do
   @look_ms 10
   @order_ms 50
   @hold_ms 500
+  # Noise comes in chunks of so many bytes.
+  @chunk 2_000
 
-  @enforce_keys [:driver, :driver_options, :base, :base_options, :options, :speed]
+  @enforce_keys [:driver, :emulated, :options, :speed]
   defstruct @enforce_keys ++
               [
+                kind: :drive,
                 link: nil,
                 ref: nil,
                 pid: nil,
@@ -31,75 +34,6 @@ defmodule Hal.DriveCase.Run do
   last that was heard; `jumped?` says whether odometry has, in one frame.
   """
   @type t :: %__MODULE__{}
-  @type result :: :ok | {:ok, t()} | {:error, line :: String.t()}
-
-  @doc "Runs with a link to a line in a folder of its own."
-  @spec within_folder(t(), (t() -> result())) :: result()
-  def within_folder(%__MODULE__{} = t, rule) do
-    name = "drive_case_#{System.pid()}_#{System.unique_integer([:positive])}"
-    folder = Path.join(System.tmp_dir!(), name)
-    File.mkdir_p!(folder)
-
-    try do
-      rule.(%{t | link: Path.join(folder, "line"), ref: make_ref()})
-    after
-      File.rm_rf!(folder)
-    end
-  end
-
-  @doc "Runs with a base and a device."
-  @spec with_base(t(), :auto | :manual, (t() -> result())) :: result()
-  def with_base(t, arm, rule) do
-    case t.base.start_link([link: t.link] ++ t.base_options) do
-      {:ok, pid} ->
-        try do
-          with_device(%{t | pid: pid}, arm, rule)
-        after
-          Process.unlink(pid)
-          GenServer.stop(pid)
-        end
-
-      {:error, line} ->
-        {:error, "its base does not start: #{inspect(line)}"}
-    end
-  end
-
-  @doc "Runs with a device alone."
-  @spec with_device(t(), :auto | :manual, (t() -> result())) :: result()
-  def with_device(t, arm, rule) do
-    driver = {t.driver, [port: t.link] ++ t.driver_options}
-    sinks = [{__MODULE__, :hear, [self(), t.ref]}]
-    options = [kind: :drive, driver: driver, sinks: sinks, arm: arm, sonar: t.options[:sonar]]
-    {:ok, device} = Device.start_link(options)
-    # A driver that crashes is a problem, not the end of the kit.
-    Process.unlink(device)
-
-    try do
-      rule.(%{t | device: device})
-    after
-      close(device)
-      flush(t.ref)
-    end
-  end
-
-  @doc "Ends a device as its supervisor does; it may have ended before."
-  @spec close(pid()) :: :ok
-  def close(device) do
-    ref = Process.monitor(device)
-    Process.exit(device, :shutdown)
-    receive do: ({:DOWN, ^ref, :process, _pid, _reason} -> :ok)
-  end
-
-  @doc false
-  def hear(pid, ref, reading), do: send(pid, {ref, reading})
-
-  defp flush(ref) do
-    receive do
-      {^ref, _reading} -> flush(ref)
-    after
-      0 -> :ok
-    end
-  end
 
   @doc "From now on this speed is repeated; `nil` for silence."
   @spec order(t(), Twist.t() | nil) :: t()
@@ -139,8 +73,7 @@ defmodule Hal.DriveCase.Run do
   def noise(t, 0, _rand), do: {:ok, t}
 
   def noise(t, times, rand) do
-    {bytes, rand} = :rand.bytes_s(2_000, rand)
-    :ok = t.base.noise(t.pid, bytes)
+    rand = DeviceCase.noise(t, @chunk, rand)
     noise(look(t, @order_ms), times - 1, rand)
   end
 
@@ -180,7 +113,7 @@ defmodule Hal.DriveCase.Run do
 
   @doc "The speed that the base gives its wheels."
   @spec wheels(t()) :: Twist.t()
-  def wheels(t), do: t.base.wheels(t.pid)
+  def wheels(t), do: DeviceCase.tell(t, :wheels)
 
   @doc "The speed by odometry; what rounding makes of a standing wheel is none."
   @spec measured(t()) :: Twist.t()

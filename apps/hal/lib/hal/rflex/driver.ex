@@ -19,7 +19,8 @@ defmodule Hal.RFlex.Driver do
   | `:ir_order` | for each pose of the profile, its place in the reports | a Magellan's; otherwise as they come |
   | `:ir_law`, `:ir_min` | `:metres` or `:millimetres`; metres | `:metres`; `0.1` |
   | `:power_offset` | volts by which the controller reads too low | `0.0` |
-  | `:joystick` | whether to poll it | `false` |
+  | `:joystick` | whether a person may drive by the base's own joystick | `false`: it is not polled |
+  | `:joystick_ratios` | `{m/s, rad/s}` a count of its two axes, -1.0 to 1.0 | `{0.006, -0.01}`, those of the thesis's ATRV mini |
   | `:home` | address of the heading switch | `nil`: none |
   | `:report_period` | between reports of wheels and bumpers, microseconds | `100_000` |
   | `:pace_ms` | between two commands, 1 to 50 | `12` |
@@ -46,7 +47,8 @@ defmodule Hal.RFlex.Driver do
 
   They are those of `Hal.Drive`. Ranges come with each sonar report, once every sonar was heard.
   The base reports only changes of bumpers, so their state is repeated every 100 ms while the base
-  reports anything. The joystick is only read; this driver does not drive by it.
+  reports anything. The joystick, polled ten times a second, is a reading, too: this driver does not drive by it, and the
+  robot's comms takes it for the word of a person (`Swarm.Comms.Joystick`).
 
   Odometry continues where it was when a lost line is opened again in the same process; a new
   process starts at zero, in a new frame (`Hal.Odometry`). When a counter jumps

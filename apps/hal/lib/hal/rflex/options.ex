@@ -31,6 +31,8 @@ defmodule Hal.RFlex.Options do
   ]
   @times {:tuple, [{:integer, 1, 1_000_000}, {:integer, 0, 1_000_000}, {:integer, 0, 1_000_000}],
           "{echo, ping, set}, whole microseconds up to 1000000,"}
+  @ratio {:number, -1.0, 1.0}
+  @ratios {:tuple, [@ratio, @ratio], "{m/s, rad/s} a count, numbers from -1.0 to 1.0,"}
   @own [
     profile: [
       {:check, &__MODULE__.profile/1, ":magellan, :atrv_mini or a %Hal.Profile{}"},
@@ -49,6 +51,7 @@ defmodule Hal.RFlex.Options do
     ir_min: [{:number, 0.0, 1.0, "m"}, default: 0.1],
     power_offset: [{:number, -10.0, 10.0, "V"}, default: 0.0],
     joystick: [:boolean, default: false],
+    joystick_ratios: [@ratios, default: {0.006, -0.01}],
     home: [{:integer, 0, 255}, default: nil],
     report_period: [{:integer, 20_000, 200_000, "microseconds"}, default: 100_000],
     pace_ms: [{:integer, 1, 50, "ms"}, default: 12]

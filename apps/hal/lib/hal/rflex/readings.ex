@@ -2,13 +2,14 @@ defmodule Hal.RFlex.Readings do
   @moduledoc false
   # Converts the controller's packets to readings in our units. Pure; the time of arrival is passed
   # in, as integer milliseconds.
+  import Bitwise, only: [band: 2]
   alias Hal.RFlex.Options
   alias Hal.RFlex.Protocol.{Packet, Report}
   alias Hal.RFlex.Sensors.{Bumpers, IndexSwitch, Infrared, Odometry, Sonar}
 
   @most_volts 60.0
 
-  @enforce_keys [:odometry, :sonar, :infrared, :bumpers, :home_address, :power_offset]
+  @enforce_keys [:odometry, :sonar, :infrared, :bumpers, :home_address, :power_offset, :ratios]
   defstruct @enforce_keys ++
               [
                 frame: nil,
@@ -20,7 +21,7 @@ defmodule Hal.RFlex.Readings do
               ]
 
   @typedoc """
-  `frame` is that of the odometry; `paired?` says whether both wheel counters have been heard;
+  `ratios` are those of the joystick, m/s and rad/s a count. `frame` is that of the odometry; `paired?` says whether both wheel counters have been heard;
   `counts` counts packets that were `unknown`, `malformed`, or `implausible`.
   """
   @type t :: %__MODULE__{}
@@ -38,7 +39,8 @@ defmodule Hal.RFlex.Readings do
       infrared: infrared(options),
       bumpers: options.bumpers,
       home_address: options.home,
-      power_offset: options.power_offset
+      power_offset: options.power_offset,
+      ratios: options.joystick_ratios
     }
   end
 
@@ -51,7 +53,7 @@ defmodule Hal.RFlex.Readings do
       {:infrared, banks} -> infrared(senses, banks)
       {:input, address, state} -> input(senses, address, state)
       {:status, centivolts, brake} -> status(senses, centivolts, brake)
-      {:joystick, x, y, buttons} -> {[{:joystick, %{x: x, y: y, buttons: buttons}}], senses}
+      {:joystick, x, y, buttons} -> {[joystick(senses, x, y, buttons)], senses}
       {:screen, _row, _bytes} -> {[], senses}
       other -> {[], count(senses, other)}
     end
@@ -160,6 +162,12 @@ defmodule Hal.RFlex.Readings do
     if volts <= @most_volts,
       do: {[{:power, volts}, {:brake, brake != 0}], %{senses | brake: brake != 0}},
       else: {[], count(senses, :implausible)}
+  end
+
+  # Its first button is the dead man's. Only the robot knows what is too fast.
+  defp joystick(%{ratios: {ahead, left}}, x, y, buttons) do
+    twist = Hal.Twist.new(y * ahead, x * left)
+    {:joystick, %{twist: twist, held?: band(buttons, 1) == 1}}
   end
 
   defp count(senses, what),

@@ -162,7 +162,8 @@ defmodule Hal.RFlex.DriverTest do
     assert {:bumpers, [0]} in t.readings
     assert {:power, 24.5} in t.readings
     assert {:brake, false} in t.readings
-    assert {:joystick, %{x: -12, y: 40, buttons: 1}} in t.readings
+    # 6 mm/s and -0.01 rad/s a count.
+    assert {:joystick, %{twist: Twist.new(0.24, 0.12), held?: true}} in t.readings
     assert %{unknown: 3, packets: 13} = Driver.counts(t.driver)
 
     # Bumpers that stand are said again without any report. Ranges are not: they are as old as they are.

@@ -60,6 +60,8 @@ defmodule Hal.RFlex.OptionsTest do
       ir_min: -1,
       power_offset: 1.0e308,
       joystick: 1,
+      joystick_ratios: {6, -0.01},
+      joystick_ratios: 0.006,
       home: 256,
       report_period: 0,
       pace_ms: 0,

@@ -26,6 +26,14 @@ defmodule Sim.Device.Camera do
   end
 
   @impl Hal.Camera
+  def explain(:no_world, options),
+    do: "its simulated world #{inspect(options[:world])} is not there"
+
+  def explain(:no_ground, _options), do: "what stands still in its world was lost on the way"
+  def explain(:mute, _options), do: "its world sends no view"
+  def explain(reason, _options), do: inspect(reason)
+
+  @impl Hal.Camera
   def next(%{line: {server, _}} = camera) do
     World.Server.next(server, camera.robot)
     {:ok, camera}
