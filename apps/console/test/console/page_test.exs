@@ -10,6 +10,7 @@ defmodule Console.PageTest do
   doctest Page.Access
   doctest Changes
   doctest State
+  doctest Console.Cli.Condition
 
   @server (case Application.ensure_all_started(:mochiweb) do
              {:ok, _apps} -> nil
