@@ -1,24 +1,15 @@
 defmodule Console.PageEventsTest do
   @moduledoc "The page's lists of what happened and of what was ordered, in a real browser."
   use ExUnit.Case, async: true
-  alias Console.{Browser, FakeLive, Page}
+  import Console.PageCase
+  alias Console.{Browser, FakeLive}
   @moduletag :realtime
   @moduletag :capture_log
-
-  @server (case Application.ensure_all_started(:mochiweb) do
-             {:ok, _apps} -> nil
-             _absent -> "erlang-mochiweb is not installed"
-           end)
-  @moduletag skip: @server || Browser.why_not()
+  @moduletag skip: why_not()
 
   setup do
     scene = FakeLive.of([{:mag1, {0.0, 0.0}, []}, {:min1, {2.0, 0.0}, []}])
-    {:ok, live} = FakeLive.start_link(scene, [:kill])
-    robots = [:mag1, :min1]
-    {:ok, _page, url} = Page.start_link(module: FakeLive, live: live, robots: robots)
-    browser = Browser.open({1280, 800})
-    Browser.go(browser, url)
-    Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
+    {live, browser} = shown(scene, [:kill])
     %{browser: browser, live: live}
   end
 

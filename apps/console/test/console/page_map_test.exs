@@ -1,39 +1,13 @@
 defmodule Console.PageMapTest do
   @moduledoc "What the map shows of the floor, and what pointers and fingers do to it, in a real browser."
   use ExUnit.Case, async: true
-  alias Console.{Browser, FakeLive, Page}
+  import Console.PageCase
+  alias Console.{Browser, FakeLive}
   @moduletag :realtime
   @moduletag :capture_log
-
-  @server (case Application.ensure_all_started(:mochiweb) do
-             {:ok, _apps} -> nil
-             _absent -> "erlang-mochiweb is not installed"
-           end)
-  @moduletag skip: @server || Browser.why_not()
+  @moduletag skip: why_not()
 
   @pair [{:mag1, {3.0, 2.0}, []}, {:min1, {4.0, 3.0}, []}]
-
-  defp page(scene, offers) do
-    {:ok, live} = FakeLive.start_link(scene, offers)
-    robots = for robot <- scene.robots, do: robot.id
-    {:ok, _page, url} = Page.start_link(module: FakeLive, live: live, robots: robots)
-    browser = Browser.open({1280, 800})
-    Browser.go(browser, url)
-    Browser.await(browser, "return window.floor.scene && window.floor.view.blind === false")
-    {live, browser}
-  end
-
-  # A place of the floor in the window.
-  defp pixel(browser, {x, y}) do
-    [px, py] =
-      Browser.run(browser, """
-      const box = document.getElementById('map').getBoundingClientRect();
-      const [x, y] = window.floor.toPixel(#{x}, #{y});
-      return [x + box.left, y + box.top];
-      """)
-
-    {px, py}
-  end
 
   # A place of the window on the floor.
   defp place(browser, {px, py}) do
@@ -48,16 +22,16 @@ defmodule Console.PageMapTest do
 
   defp scale(browser), do: Browser.run(browser, "return window.floor.view.at.scale")
 
-  defp near(a, b, within), do: Hal.Pose.distance(a, b) < within
-
-  defp click(browser, {x, y}) do
+  defp press(browser, {x, y}) do
     at = [x: x, y: y, button: "left", clickCount: 1]
     Browser.mouse(browser, "mousePressed", at ++ [buttons: 1])
     Browser.mouse(browser, "mouseReleased", at)
   end
 
+  defp near(a, b, within), do: Hal.Pose.distance(a, b) < within
+
   test "it begins with the fleet, brings back what drives out of it, and shows all where that is asked" do
-    {live, browser} = page(FakeLive.of(@pair), [:kill])
+    {live, browser} = shown(FakeLive.of(@pair), [:kill])
     fleet = scale(browser)
     {x, y} = place(browser, {464.0, 350.0})
     assert near({x, y}, {3.5, 2.5}, 1.0)
@@ -90,7 +64,7 @@ defmodule Console.PageMapTest do
   end
 
   test "what the pointer is on stays under it while the wheel or two fingers zoom, and its place is told" do
-    {live, browser} = page(FakeLive.of(@pair), [:kill])
+    {live, browser} = shown(FakeLive.of(@pair), [:kill])
     at = {300.0, 420.0}
     {x, y} = place(browser, at)
     before = scale(browser)
@@ -129,10 +103,10 @@ defmodule Console.PageMapTest do
 
   test "a simulated robot goes where a click says, and its goal is shown at once; for a real one a second click is needed" do
     for {offers, asks?} <- [{[:kill], false}, {[:arm], true}] do
-      {live, browser} = page(FakeLive.of(@pair), offers)
+      {live, browser} = shown(FakeLive.of(@pair), offers)
       Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
       goal = {2.0, 3.0}
-      click(browser, pixel(browser, goal))
+      press(browser, pixel(browser, goal))
       Browser.await(browser, "return window.floor.ghost?.id === 'mag1'")
       [x, y] = Browser.run(browser, "return [window.floor.ghost.x, window.floor.ghost.y]")
       assert near({x, y}, goal, 0.05)
@@ -142,7 +116,7 @@ defmodule Console.PageMapTest do
         # Cancelled, there is no goal, and no order.
         Browser.run(browser, "[...document.querySelectorAll('#confirm button')][1].click()")
         assert Browser.run(browser, "return window.floor.ghost") == nil
-        click(browser, pixel(browser, goal))
+        press(browser, pixel(browser, goal))
         Browser.await(browser, "return document.getElementById('confirm').checkVisibility()")
         Browser.run(browser, "document.querySelector('#confirm button').click()")
       end
@@ -161,9 +135,9 @@ defmodule Console.PageMapTest do
 
   test "a robot that cannot move is not sent, and the page says why" do
     held = [{:mag1, {3.0, 2.0}, state: "disarmed", arming: {:disarmed, nil}}]
-    {live, browser} = page(FakeLive.of(held), [:arm])
+    {live, browser} = shown(FakeLive.of(held), [:arm])
     Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
-    click(browser, pixel(browser, {2.0, 3.0}))
+    press(browser, pixel(browser, {2.0, 3.0}))
 
     Browser.await(
       browser,

@@ -1,15 +1,11 @@
 defmodule Console.PageStateTest do
   @moduledoc "What the page shows of robots that cannot do their work, and what it offers for them, in a real browser."
   use ExUnit.Case, async: true
-  alias Console.{Browser, FakeLive, Pace, Page}
+  import Console.PageCase
+  alias Console.{Browser, FakeLive, Pace}
   @moduletag :realtime
   @moduletag :capture_log
-
-  @server (case Application.ensure_all_started(:mochiweb) do
-             {:ok, _apps} -> nil
-             _absent -> "erlang-mochiweb is not installed"
-           end)
-  @moduletag skip: @server || Browser.why_not()
+  @moduletag skip: why_not()
 
   @fleet [
     {:mag1, {-3.0, 0.0}, state: :lead, leader?: true},
@@ -22,22 +18,8 @@ defmodule Console.PageStateTest do
     {:min5, {4.0, 1.0}, state: "line lost", arming: {:line_lost, nil}}
   ]
 
-  defp page(scene, offers \\ [:arm], size \\ {1280, 800}) do
-    {:ok, live} = FakeLive.start_link(scene, offers)
-    robots = for robot <- scene.robots, do: robot.id
-    {:ok, _page, url} = Page.start_link(module: FakeLive, live: live, robots: robots)
-    browser = Browser.open(size)
-    Browser.go(browser, url)
-    count = length(robots)
-    Browser.await(browser, "return document.querySelectorAll('#robots tr').length === #{count}")
-    {live, browser}
-  end
-
   defp text(browser, selector),
     do: Browser.run(browser, "return document.querySelector(\"#{selector}\").textContent")
-
-  defp click(browser, selector),
-    do: Browser.run(browser, "document.querySelector(\"#{selector}\").click()")
 
   # What is greyed, with its reason.
   defp grey(browser, selector) do
@@ -62,7 +44,7 @@ defmodule Console.PageStateTest do
   end
 
   test "what is wrong with a robot stands in the list, with why where it is chosen" do
-    {_live, browser} = page(FakeLive.of(@fleet))
+    {_live, browser} = shown(FakeLive.of(@fleet), [:arm])
 
     badges =
       Browser.run(browser, """
@@ -97,7 +79,7 @@ defmodule Console.PageStateTest do
   end
 
   test "what cannot be done now is grey and says why; a stop never is" do
-    {live, browser} = page(FakeLive.of(@fleet))
+    {live, browser} = shown(FakeLive.of(@fleet), [:arm])
     choose = &click(browser, "[data-id=#{&1}] button")
 
     choose.(:mag1)
@@ -146,7 +128,7 @@ defmodule Console.PageStateTest do
   end
 
   test "while an emergency stop holds, a bar says so, with its reset, which asks in its place" do
-    {live, browser} = page(FakeLive.of(@fleet), [:arm], {390, 844})
+    {live, browser} = shown(FakeLive.of(@fleet), [:arm], {390, 844})
     assert hidden?(browser, "#stop")
     assert grey(browser, "#start") == nil
     FakeLive.change(live, &stopped/1)
@@ -187,7 +169,7 @@ defmodule Console.PageStateTest do
 
   test "controls show what is in force until a person changes them, and again when that was ordered" do
     scene = FakeLive.of(@fleet, mission: "patrol")
-    {live, browser} = page(scene, [:kill, :landmark])
+    {live, browser} = shown(scene, [:kill, :landmark])
     FakeLive.paced(live, Pace.new(2.0))
 
     values = fn ->
