@@ -119,12 +119,12 @@ defmodule Console.Terminal do
   end
 
   defp leader(%{leader: nil}), do: "no leader"
-  defp leader(scene), do: "#{scene.leader} leads, epoch #{scene.epoch}"
+  defp leader(scene), do: "#{scene.leader} leads"
 
   defp error(%{error: nil}), do: ""
 
   defp error(%{error: {mean, max}} = scene) do
-    word = if scene.formed?, do: "formed", else: "error"
+    word = if scene.formed?, do: "formed", else: "position error"
     "#{word} #{Format.decimals(mean, 2)}/#{Format.decimals(max, 2)} m"
   end
 

@@ -78,7 +78,12 @@ export function follows(...ids) {
   for (const id of ids) by(id).addEventListener("input", () => by(id).classList.add("edited"));
 }
 
-export const ordered = (...ids) => ids.forEach((id) => by(id).classList.remove("edited"));
+// Whether a person had changed one of them.
+export function ordered(...ids) {
+  const edited = ids.some((id) => by(id).classList.contains("edited"));
+  for (const id of ids) by(id).classList.remove("edited");
+  return edited;
+}
 
 function follow(id, value) {
   const control = by(id);

@@ -283,7 +283,8 @@ for (const name of ["blur", "focusin", "contextmenu", "visibilitychange"]) addEv
 
 by("estop").onclick = estop;
 press(by("reset"), () => say("reset"), refuse);
-press(by("start"), () => (ordered("mission"), say(`start ${by("mission").value}`.trim())), refuse);
+// What is in force goes on with the options that it has; another mission is named.
+press(by("start"), () => say(ordered("mission") ? `start ${by("mission").value}`.trim() : "start"), refuse);
 press(by("form"), () => (ordered("shape", "spacing"), say(`formation ${by("shape").value} ${by("spacing").value}`)), refuse);
 press(by("drive"), () => drive(!driving), refuse);
 by("speed").onchange = () => (ordered("speed"), say(`speed ${by("speed").value}`));

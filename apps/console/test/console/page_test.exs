@@ -1,40 +1,20 @@
 defmodule Console.PageTest do
   @moduledoc "The page as browsers and strangers see it; with a real browser, where there is one."
   use ExUnit.Case, async: true
+  import Console.PageCase
+  import Swarm.Case, only: [eventually: 1]
   import Console.Wire, only: [ask: 2, ask: 3]
   alias Console.{Browser, Live, Options, Page}
-  alias Console.Page.{Changes, Client, State}
+  alias Console.Page.{Changes, State}
   @moduletag :realtime
   @moduletag :capture_log
 
   doctest Page.Access
   doctest Changes
   doctest State
+  doctest Console.Cli.Condition
 
-  @server (case Application.ensure_all_started(:mochiweb) do
-             {:ok, _apps} -> nil
-             _absent -> "erlang-mochiweb is not installed"
-           end)
-  @moduletag skip: @server
-
-  defp options(line) do
-    {:ok, options} = line |> OptionParser.split() |> Options.parse()
-    options
-  end
-
-  # As fast as it goes, in lockstep.
-  defp trial(line \\ "--robots 3 --seed 4 --blobs direct") do
-    options = options(line)
-    start = {Live.Trial, :start_link, [Lab.Trial, Options.trial(options), Console.Pace.new(:max)]}
-    {options, start_supervised!(%{id: make_ref(), start: start})}
-  end
-
-  defp page(options, module, live, more \\ []) do
-    {:ok, page, url} =
-      Page.start_link([module: module, live: live, robots: options.robots] ++ more)
-
-    {page, url}
-  end
+  @moduletag skip: no_server()
 
   describe "requests" do
     setup do
@@ -114,32 +94,10 @@ defmodule Console.PageTest do
   end
 
   describe "in a browser" do
-    @describetag skip: @server || Browser.why_not()
-
-    defp open(url, size \\ {1280, 800}) do
-      browser = Browser.open(size)
-      Browser.go(browser, url)
-      browser
-    end
+    @describetag skip: why_not()
 
     defp fleet(browser),
       do: Browser.run(browser, "return document.getElementById('fleet').textContent")
-
-    # What a keyboard says again and again of a W that is held.
-    defp repeat(browser),
-      do: Browser.keyboard(browser, :down, code: "KeyW", key: "w", autoRepeat: true)
-
-    # Where a place of the map is in the window.
-    defp pixel(browser, {x, y}) do
-      [px, py] =
-        Browser.run(browser, """
-        const box = document.getElementById('map').getBoundingClientRect();
-        const [x, y] = window.floor.toPixel(#{x}, #{y});
-        return [x + box.left, y + box.top];
-        """)
-
-      {px, py}
-    end
 
     test "it shows the fleet without an error; the landmark is dragged; a killed leader is followed by another" do
       {options, live} = trial()
@@ -222,7 +180,7 @@ defmodule Console.PageTest do
         )
 
         following = fn -> Enum.find(module.scene(live).robots, &(&1.state == :follow)) end
-        wait(following)
+        eventually(following)
         follower = following.()
         choose = "document.querySelector('[data-id=#{follower.id}] button').click()"
         Browser.run(browser, choose)
@@ -327,18 +285,18 @@ defmodule Console.PageTest do
       to.("#map")
       Browser.press(browser, [:left, :down, :enter])
       answered.("goto min1 -")
-      wait(fn -> Swarm.status(:min1).state == :goto end)
+      eventually(fn -> Swarm.status(:min1).state == :goto end)
 
       to.("[data-one=stop]")
       Browser.press(browser, [" "])
       answered.("stop min1: accepted")
-      wait(fn -> Swarm.status(:min1).state != :goto end)
+      eventually(fn -> Swarm.status(:min1).state != :goto end)
       to.("#mission")
       Browser.press(browser, ["p"])
       to.("#start")
       Browser.press(browser, [:enter])
       answered.("start patrol: accepted")
-      wait(fn -> Swarm.status(:mag1).state in [:watch, :visit] end)
+      eventually(fn -> Swarm.status(:mag1).state in [:watch, :visit] end)
       to.("[data-line=stop]")
       Browser.press(browser, [:enter])
       answered.("stop: accepted")
@@ -346,12 +304,12 @@ defmodule Console.PageTest do
       to.("#drive")
       Browser.press(browser, [:enter])
       Browser.key(browser, :keyDown, "w")
-      wait(fn -> repeat(browser) && Swarm.status(:min1).by == :move end)
+      eventually(fn -> repeat(browser) && Swarm.status(:min1).by == :move end)
 
       # Wherever the focus is, also where text is typed.
       to.("#line")
       Browser.press(browser, [:f8])
-      wait(fn -> Swarm.status(:min1).estop and Swarm.status(:mag1).estop end)
+      eventually(fn -> Swarm.status(:min1).estop and Swarm.status(:mag1).estop end)
       Browser.await(browser, "return document.getElementById('drive').ariaPressed === 'false'")
       Browser.key(browser, :keyUp, "w")
       # What asks first does so in its place, and the emergency stop works meanwhile.
@@ -367,195 +325,6 @@ defmodule Console.PageTest do
       assert Browser.errors(browser) == []
       Browser.close(browser)
       Live.Fleet.stop(live)
-    end
-
-    test "one click stops all; a page that is loaded again, or whose server was away, goes on" do
-      {options, live} = trial("--robots 2 --seed 2 --blobs direct")
-      {page, url} = page(options, Live.Trial, live)
-      browser = open(url, {390, 844})
-      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
-      Browser.run(browser, "document.getElementById('estop').click()")
-
-      Browser.await(
-        browser,
-        "return document.getElementById('answer').textContent === 'estop: accepted'"
-      )
-
-      Browser.await(
-        browser,
-        "const s = window.floor.scene; return s.robots.every((r) => r.state === 'E-STOP') && document.getElementById('held').innerText.includes('called by demo: 2 of 2 robots held')"
-      )
-
-      Browser.run(browser, "location.reload()")
-      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
-
-      # Nobody tells the page anything: it must not pass for the present.
-      :sys.suspend(Page.Feed.of(page))
-      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
-      :sys.resume(Page.Feed.of(page))
-      Browser.await(browser, "return document.getElementById('fleet').className === ''")
-      Process.exit(Page.Feed.of(page), :kill)
-
-      Browser.await(
-        browser,
-        "const was = window.was ??= window.floor.scene.at_s; return window.floor.scene.at_s > was + 20"
-      )
-
-      Process.unlink(page)
-      :ok = Supervisor.stop(page)
-      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
-      %URI{port: port} = URI.parse(url)
-      {_page, ^url} = page(options, Live.Trial, live, port: port)
-      Browser.await(browser, "return document.getElementById('fleet').className === ''")
-      Browser.close(browser)
-    end
-
-    test "a robot that is driven stands soon after the key was let go, and when the page is gone" do
-      options = options("--robots 1 --landmark none")
-      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
-      {_page, url} = page(options, Live.Fleet, live)
-      browser = open(url)
-      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
-
-      Browser.run(
-        browser,
-        "document.querySelector('#robots button').click(); document.getElementById('drive').click()"
-      )
-
-      [%{id: id}] = Live.Fleet.scene(live).robots
-
-      # What it does, and what its camera sees; the blobs in it are drawn on the page.
-      Browser.await(
-        browser,
-        "return document.getElementById('about').textContent.includes('m/s')"
-      )
-
-      assert {200, _head, <<0xFF, 0xD8, _jpeg::binary>>} = ask(url, "GET /camera/#{id}")
-      assert {404, _head, _line} = ask(url, "GET /camera/mag99")
-
-      for ending <- [
-            fn -> Browser.key(browser, :keyUp, "w") end,
-            fn -> Browser.close(browser) end
-          ] do
-        Browser.key(browser, :keyDown, "w")
-        wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
-        ending.()
-        wait(fn -> Swarm.status(id).speed == 0.0 end)
-      end
-
-      Live.Fleet.stop(live)
-    end
-
-    test "what was clicked before the link stood still is not carried out after it; a silent page sends stops alone" do
-      options = options("--robots 1 --landmark none")
-      {:ok, live} = Live.Fleet.start_link(Map.put(Options.trial(options), :mission, false))
-      {page, url} = page(options, Live.Fleet, live)
-      browser = open(url)
-      [%{id: id}] = Live.Fleet.scene(live).robots
-      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
-      click = &Browser.run(browser, "document.querySelector('#{&1}').click()")
-
-      answered = fn text ->
-        Browser.await(
-          browser,
-          "return document.getElementById('answer').textContent.includes('#{text}')"
-        )
-      end
-
-      # It is heard a second late, and the scenes come all the while.
-      hearer = connection(live)
-      true = :erlang.suspend_process(hearer)
-      click.("#start")
-      Browser.run(browser, "window.clicked = performance.now()")
-      Browser.await(browser, "return performance.now() - window.clicked > 1000")
-      true = :erlang.resume_process(hearer)
-      answered.("and not carried out: at most 0.5 s")
-      assert %{state: :idle} = Swarm.status(id)
-
-      # Words of driving, too: the robot does not move after the hand has let go.
-      click.("#robots button")
-      click.("#drive")
-      true = :erlang.suspend_process(hearer)
-      Browser.key(browser, :keyDown, "w")
-      Browser.run(browser, "window.clicked = performance.now()")
-      Browser.await(browser, "return performance.now() - window.clicked > 400")
-      Browser.key(browser, :keyUp, "w")
-      Browser.run(browser, "window.clicked = performance.now()")
-      Browser.await(browser, "return performance.now() - window.clicked > 400")
-      true = :erlang.resume_process(hearer)
-      click.("#start")
-      answered.("start: accepted")
-      assert %{by: by} = Swarm.status(id)
-      refute by == :move
-
-      # Nothing is heard: the page says so, and holds nothing back for later.
-      feed = Page.Feed.of(page)
-      :ok = :sys.suspend(feed)
-      Browser.await(browser, "return document.getElementById('fleet').className === 'lost'")
-      click.("#start")
-      answered.("not sent, because the fleet is not heard: start")
-      click.("#estop")
-      answered.("estop: accepted")
-      wait(fn -> Swarm.status(id).estop end)
-      :ok = :sys.resume(feed)
-      Browser.await(browser, "return document.getElementById('fleet').className === ''")
-      assert :ok = Swarm.Case.order(&Swarm.reset/0)
-      assert Browser.errors(browser) == []
-      Browser.close(browser)
-      Live.Fleet.stop(live)
-    end
-
-    # The process that hears what the page says.
-    defp connection(live) do
-      [client] = clients(live)
-      {:links, links} = Process.info(client, :links)
-      [hearer] = for pid <- links, is_pid(pid), do: pid
-      hearer
-    end
-
-    test "a client that is killed while a key is held stops the robot, and the page connects again" do
-      options = options("--robots 1 --landmark none")
-      {:ok, live} = Live.Fleet.start_link(Options.trial(options))
-      {_page, url} = page(options, Live.Fleet, live)
-      browser = open(url)
-      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 1")
-
-      Browser.run(
-        browser,
-        "document.querySelector('#robots button').click(); document.getElementById('drive').click()"
-      )
-
-      [%{id: id}] = Live.Fleet.scene(live).robots
-      Browser.key(browser, :keyDown, "w")
-      wait(fn -> repeat(browser) && Swarm.status(id).speed > 0.1 end)
-      [client] = clients(live)
-      Process.exit(client, :kill)
-      killed_ms = System.monotonic_time(:millisecond)
-      # From then on it brakes, as hard as its base does.
-      wait(fn -> Swarm.status(id).by != :move end)
-      assert System.monotonic_time(:millisecond) - killed_ms < 1_000
-      wait(fn -> Swarm.status(id).speed == 0.0 end)
-      wait(fn -> match?([other] when other != client, clients(live)) end)
-      Browser.await(browser, "return document.getElementById('fleet').className === ''")
-      assert Swarm.status(id).speed == 0.0
-      Browser.close(browser)
-      Live.Fleet.stop(live)
-    end
-
-    defp clients(live) do
-      for pid <- Process.list(),
-          {:dictionary, about} <- [Process.info(pid, :dictionary)],
-          about[:"$initial_call"] == {Client, :init, 1},
-          :sys.get_state(pid).live == live,
-          do: pid
-    end
-
-    defp wait(true?, left \\ 600) do
-      cond do
-        true?.() -> :ok
-        left == 0 -> flunk("in vain")
-        true -> receive(do: (:never -> :ok), after: (50 -> wait(true?, left - 1)))
-      end
     end
   end
 end

@@ -34,11 +34,11 @@ defmodule Console.TerminalTest do
     end
   end
 
-  test "shows leader, epoch, error, robots and the landmark" do
+  test "shows leader, error, robots and the landmark" do
     text = "" |> Runs.scene(12) |> screen(80, 24) |> Enum.join("\n")
 
     for word <- [
-          "mag1 leads, epoch 1",
+          "mag1 leads",
           "error ",
           "column 1.0 m",
           "◆",

@@ -91,6 +91,7 @@ defmodule Lab.VirtualRobot do
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
       claim = Map.put(claim, :believed, believed(board))
       claim = if Board.latched?(board), do: Map.put(claim, :estop, callers(board)), else: claim
+      claim = for {key, why} <- faults(board), why != nil, into: claim, do: {key, why}
 
       Manual.shown(state, claim)
     else
@@ -103,6 +104,22 @@ defmodule Lab.VirtualRobot do
   defp timely(:idle, claim, _age_ms), do: claim
 
   defp callers(board), do: board |> EStop.written() |> EStop.State.callers()
+
+  # What keeps it from its work, as a status says it.
+  defp faults(board) do
+    crashed =
+      for part <- [:pilot, :executive],
+          {:ok, line, at_ms} <- [Board.fetch(board, {:crashed, part}, :infinity)],
+          do: {at_ms, line}
+
+    arming =
+      with {:ok, %{state: state, why: why}, _at_ms} when state != :armed <-
+             Board.fetch(board, :arming, :infinity),
+           do: {if(state == :disarmed, do: :disarmed, else: :line_lost), why},
+           else: (_armed_or_not_known -> nil)
+
+    [crashed: with({_at_ms, line} <- Enum.max(crashed, fn -> nil end), do: line), arming: arming]
+  end
 
   defp believed(board) do
     with {:ok, pose, _at_ms} <- Board.fetch(board, :pose, :infinity),

@@ -4,7 +4,7 @@ defmodule Sim.Scene do
 
   The lockstep run and the live fleet both produce it, so the terminal, the page and the picture
   can draw either. Poses are the true ones, in metres and radians, in the frame `map`; `at_ms`
-  counts simulated milliseconds from the start.
+  counts simulated milliseconds from the start. `mission` is the name of the mission that most robots run, `nil` if that is not known.
   """
   alias Hal.Pose
 
@@ -12,6 +12,7 @@ defmodule Sim.Scene do
   defstruct @enforce_keys ++
               [
                 landmark: nil,
+                mission: nil,
                 leader: nil,
                 epoch: 0,
                 formation: {:column, 1.0},
@@ -27,7 +28,8 @@ defmodule Sim.Scene do
   is the share of its picture that the landmark fills, in parts per million, and `nil` while it
   does not see it. By its own estimate the robot is within `uncertainty` metres of where it
   believes to be (`believed`, in the frame of its estimate) in 95 of 100 cases, `nil` if it does not know. `blocked_by` and
-  `says` are the lines of its mission for people, `nil` if there is nothing to say.
+  `says` are the lines of its mission for people, `nil` if there is nothing to say. `crashed`, `fault` (lines), `offline` (devices), `lost`
+  and `arming`, where the wheels may not turn, say what else keeps it from its work.
   """
   @type robot :: %{
           required(:id) => atom(),
@@ -43,6 +45,11 @@ defmodule Sim.Scene do
           optional(:believed) => Pose.t() | nil,
           optional(:blocked_by) => String.t() | nil,
           optional(:says) => String.t() | nil,
+          optional(:crashed) => String.t() | nil,
+          optional(:fault) => String.t() | nil,
+          optional(:offline) => [atom() | String.t()],
+          optional(:lost) => boolean(),
+          optional(:arming) => {:disarmed | :line_lost, why :: String.t() | nil} | nil,
           optional(atom()) => term()
         }
 
@@ -67,6 +74,7 @@ defmodule Sim.Scene do
           map: term(),
           robots: [robot()],
           landmark: Pose.point() | nil,
+          mission: String.t() | nil,
           leader: atom() | nil,
           epoch: non_neg_integer(),
           formation: {atom(), float()},

@@ -24,10 +24,10 @@ defmodule Console.Cli.Condition do
       []
       iex> held = %{alive: true, state: :estop, blocked_by: "mag2"}
       iex> for c <- Console.Cli.Condition.of(held), do: {c.kind, c.word, c.bars}
-      [{:stop, "E-STOP", "the emergency stop holds it until a reset"}, {:warn, "blocked", nil}]
+      [{:stop, "E-STOP", "held by the emergency stop until a reset"}, {:warn, "blocked", nil}]
       iex> [dead] = Console.Cli.Condition.of(%{alive: false, state: :dead, blocked_by: "mag2"})
       iex> {dead.word, dead.bars}
-      {"dead", "it is dead"}
+      {"dead", "dead"}
   """
   @spec of(
           Sim.Scene.robot()
@@ -35,15 +35,15 @@ defmodule Console.Cli.Condition do
         ) ::
           [t()]
   def of(%{alive: false, state: :not_heard}),
-    do: [wrong(:off, "not heard", nil, "it is not heard", true)]
+    do: [wrong(:off, "not heard", nil, "not heard", true)]
 
-  def of(%{alive: false}), do: [wrong(:off, "dead", nil, "it is dead", true)]
+  def of(%{alive: false}), do: [wrong(:off, "dead", nil, "dead", true)]
 
   def of(robot) do
     Enum.filter(
       [
         robot.state == :estop &&
-          wrong(:stop, "E-STOP", nil, "the emergency stop holds it until a reset", true),
+          wrong(:stop, "E-STOP", nil, "held by the emergency stop until a reset", true),
         arming(robot[:arming]),
         offline(robot[:offline] || []),
         robot.state == "no answer" &&
@@ -66,21 +66,21 @@ defmodule Console.Cli.Condition do
   defp arming(nil), do: nil
 
   defp arming({:disarmed, why}),
-    do: wrong(:warn, "disarmed", why, "it is disarmed: arm it first", true)
+    do: wrong(:warn, "disarmed", why, "disarmed: arm it first", true)
 
   defp arming({:line_lost, why}),
-    do: wrong(:bad, "line lost", why, "its line was lost: acknowledge that first", true)
+    do: wrong(:bad, "line lost", why, "line lost: acknowledge that first", true)
 
   defp offline([]), do: nil
 
   defp offline(devices) do
     names = Enum.map_join(devices, ", ", &to_string/1)
     drive? = Enum.any?(devices, &(to_string(&1) == "drive"))
-    wrong(:bad, "offline", names, if(drive?, do: "its drive is offline"))
+    wrong(:bad, "offline", names, if(drive?, do: "the drive is offline"))
   end
 
   # One that does not know its place says why.
-  defp lost(%{state: :unsure} = robot), do: wrong(:warn, "lost", robot[:says], nil, true)
+  defp lost(%{state: :unsure} = robot), do: wrong(:warn, "not sure", robot[:says], nil, true)
   defp lost(%{lost: true} = robot), do: wrong(:warn, "lost", robot[:says])
   defp lost(_robot), do: nil
 

@@ -87,6 +87,7 @@ defmodule Console.Page.State do
   defp run(scene) do
     %{
       at_s: scene.at_ms / 1000,
+      mission: scene.mission,
       leader: scene.leader,
       epoch: scene.epoch,
       formation: scene.formation && Tuple.to_list(scene.formation),
@@ -155,11 +156,12 @@ defmodule Console.Page.State do
   end
 
   # What each stage ends, as the page's list says it.
-  defp ended(:estop_over), do: "estop holds"
+  defp ended(:estop_over), do: "emergency stop"
   defp ended(:world_back), do: "world lost"
   defp ended(:radio_whole), do: "radio cut"
   defp ended(_stage), do: nil
 
+  defp words(:estop_holds), do: "emergency stop"
   defp words(name), do: name |> to_string() |> String.replace("_", " ")
 
   defp point(nil), do: nil

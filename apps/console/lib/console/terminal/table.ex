@@ -1,6 +1,6 @@
 defmodule Console.Terminal.Table do
   @moduledoc "Lists the robots in a table that fits the screen. Pure."
-  alias Console.Cli.Format
+  alias Console.Cli.{Condition, Format}
   alias Sim.Scene
 
   @width 36
@@ -73,10 +73,12 @@ defmodule Console.Terminal.Table do
     [{"  … and #{length(hidden)}: #{text}", :dim}]
   end
 
-  defp does(%{alive: false}), do: "dead"
-  defp does(%{state: :unsure}), do: "not sure"
-  defp does(%{state: :estop}), do: "E-STOP"
-  defp does(robot), do: robot.state |> Atom.to_string() |> String.slice(0, 8)
+  defp does(robot) do
+    case Condition.of(robot) do
+      [worst | _others] -> worst.word
+      [] -> robot.state |> Atom.to_string() |> String.slice(0, 8)
+    end
+  end
 
   defp off(robot) do
     case Scene.slot_error(robot) do
@@ -114,7 +116,6 @@ defmodule Console.Terminal.Table do
   defp name(_robot), do: :name
 
   defp state(%{alive: false}), do: :dead
-  defp state(%{state: held}) when held in [:blocked, :estop], do: :bad
   defp state(%{state: :unsure}), do: :unsure
-  defp state(_robot), do: :plain
+  defp state(robot), do: if(Condition.of(robot) == [], do: :plain, else: :bad)
 end

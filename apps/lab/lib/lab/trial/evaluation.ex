@@ -41,6 +41,8 @@ defmodule Lab.Trial.Evaluation do
           uncertainty: claim[:uncertainty],
           blocked_by: claim[:blocked_by],
           says: claim[:says],
+          crashed: claim[:crashed],
+          arming: claim[:arming],
           size_ppm: account.sight && account.sight.size_ppm
         }
       end
@@ -50,6 +52,7 @@ defmodule Lab.Trial.Evaluation do
       map: run.world.map,
       landmark: run.world.landmark,
       robots: robots,
+      mission: most(for {_id, %{mission: module}} <- Enum.sort(run.claims), do: module),
       leader: leader,
       epoch: run.run_log.epoch,
       formation: shape.formation,
@@ -58,6 +61,14 @@ defmodule Lab.Trial.Evaluation do
       estop: run.run_log.estop,
       stages: RunLog.stages(run.run_log)
     }
+  end
+
+  # What most of the robots do, by the name that people call it.
+  defp most([]), do: nil
+
+  defp most(modules) do
+    counts = Enum.frequencies(modules)
+    modules |> Enum.max_by(&counts[&1]) |> Swarm.MissionRegistry.name()
   end
 
   @doc "The report of a run, without its wall time; keys as in the report."

@@ -45,15 +45,21 @@ defmodule Robot.Mission.Manual do
         }
 
   @doc """
-  A robot's claim as people are shown it: its heartbeats say `:idle` while it carries out a command, which is `:manual` here.
+  A robot's claim as people are shown it: its heartbeats say `:idle` while it carries out a command, which is `:manual` here,
+  and `mission` is the module of its mission.
 
       iex> alias Robot.Mission.Manual
       iex> for phase <- [:goto, :done], do: Manual.shown({Manual, phase}, %{phase: :idle})
       [%{phase: :manual}, %{phase: :idle}]
+      iex> Manual.shown({:a_mission, :lead}, %{phase: :lead})
+      %{phase: :lead, mission: :a_mission}
   """
   @spec shown(:idle | {module(), atom()}, claim :: map()) :: map()
   def shown({__MODULE__, phase}, claim) when phase not in @over,
     do: Map.put(claim, :phase, :manual)
+
+  def shown({module, _phase}, claim) when module != __MODULE__,
+    do: Map.put(claim, :mission, module)
 
   def shown(_state, claim), do: claim
 

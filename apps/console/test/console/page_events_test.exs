@@ -1,0 +1,121 @@
+defmodule Console.PageEventsTest do
+  @moduledoc "The page's lists of what happened and of what was ordered, in a real browser."
+  use ExUnit.Case, async: true
+  import Console.PageCase
+  alias Console.{Browser, FakeLive}
+  @moduletag :realtime
+  @moduletag :capture_log
+  @moduletag skip: why_not()
+
+  setup do
+    scene = FakeLive.of([{:mag1, {0.0, 0.0}, []}, {:min1, {2.0, 0.0}, []}])
+    {live, browser} = shown(scene, [:kill])
+    %{browser: browser, live: live}
+  end
+
+  defp rows(browser, body) do
+    Browser.run(browser, """
+    return [...document.querySelectorAll('##{body} tr')].map((tr) => [...tr.cells].map((td) => td.innerText.replaceAll('\\n', ' / ')));
+    """)
+  end
+
+  test "repeats stand in one row with their count, and with what ended them", %{browser: browser} do
+    assert Browser.run(browser, """
+           return import("/events.js").then(({ fold }) => {
+             const rows = (...events) => events.map(([time, what, text, robot, ends]) => ({ time, what, text, robot, ends }))
+               .reduce(fold, []).map((r) => [r.time, r.last, r.text, r.count, r.ended?.text ?? null].join());
+             return [
+               rows(["1", "blocked", "by a wall", "mag1"], ["2", "state", "goto", "mag1"], ["3", "blocked", "by a wall", "mag1"]),
+               // Of another robot, or by another thing, it is not the same.
+               rows(["1", "blocked", "by a wall", "mag1"], ["2", "blocked", "by a wall", "min1"], ["3", "blocked", "by mag2", "mag1"]),
+               // What ends it ends the newest of its robot, once.
+               rows(["1", "blocked", "by a wall", "mag1"], ["2", "blocked", "its way is free", "mag1", "blocked"],
+                 ["3", "blocked", "its way is free", "mag1", "blocked"]),
+               rows(["1", "blocked", "by a wall", "mag1"], ["2", "blocked", "its way is free", "mag1", "blocked"],
+                 ["3", "blocked", "by a wall", "mag1"]),
+             ];
+           });
+           """) == [
+             ["2,2,goto,1,", "1,3,by a wall,2,"],
+             ["1,1,by a wall,1,", "2,2,by a wall,1,", "3,3,by mag2,1,"],
+             ["1,1,by a wall,1,its way is free", "3,3,its way is free,1,"],
+             ["1,3,by a wall,2,"]
+           ]
+
+    Browser.close(browser)
+  end
+
+  test "a row says when, what and in words; a click chooses the robot, and the moment where there is a time line",
+       %{
+         browser: browser,
+         live: live
+       } do
+    stages = [
+      %{stage: :elected, at_s: 3.25, robot: :min1, epoch: 1, size_ppm: nil},
+      %{stage: :estop_holds, at_s: 5.0, by: ["base"]},
+      %{stage: :estop_over, at_s: 9.0}
+    ]
+
+    FakeLive.change(live, &%{&1 | stages: stages})
+    Browser.run(browser, "document.getElementById('tab-events').click()")
+    Browser.await(browser, "return document.querySelectorAll('#stages tr').length === 2")
+
+    assert rows(browser, "stages") == [
+             ["3.3 s", "elected", "min1 leads (epoch 1)"],
+             [
+               "5.0 s",
+               "emergency stop",
+               "emergency stop, called by base: held until a reset / until 9.0 s: no robot is held any more; they stand until a start"
+             ]
+           ]
+
+    Browser.run(browser, """
+    window.timeline = { seek: (at_s) => (window.sought = at_s) };
+    document.querySelector('#stages button').click();
+    """)
+
+    Browser.await(browser, "return document.getElementById('chosen').textContent === 'min1'")
+    assert Browser.run(browser, "return window.sought") == 3.25
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+
+  test "orders stand with their answers; a refusal stays over the map until it is closed", %{
+    browser: browser
+  } do
+    type = fn line ->
+      Browser.run(browser, """
+      const l = document.getElementById('line'); l.value = '#{line}'; l.form.requestSubmit();
+      """)
+    end
+
+    type.("kill mag1")
+
+    Browser.await(
+      browser,
+      "return document.getElementById('answer').textContent === 'kill mag1: accepted'"
+    )
+
+    type.("formatoin wedge")
+    Browser.await(browser, "return document.getElementById('answer').className === 'bad'")
+    Browser.run(browser, "document.getElementById('tab-orders').click()")
+
+    assert [[_time, "kill mag1", "kill mag1: accepted"], [_when, "formatoin wedge", refusal]] =
+             rows(browser, "given")
+
+    assert refusal =~ "did you mean formation?"
+
+    shown? = fn ->
+      Browser.run(
+        browser,
+        "return getComputedStyle(document.getElementById('toast')).visibility === 'visible'"
+      )
+    end
+
+    assert shown?.()
+    Browser.run(browser, "document.getElementById('close').click()")
+    refute shown?.()
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+end
