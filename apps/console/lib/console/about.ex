@@ -1,7 +1,8 @@
 defmodule Console.About do
-  @moduledoc false
-  # Describes what a robot knows and does, for the page: the wishes, what limits it, its way, its devices, what its
-  # sonars and its camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
+  @moduledoc """
+  Describes what a robot knows and does, for the page: the wishes, what limits it, its way, its devices, what its
+  sonars and its camera see. Of a robot of this node it is read from its board, so that no process of the robot is asked.
+  """
   alias Hal.{Json, Odometry, Pose}
   alias Robot.{Board, Names, Percept}
   alias Robot.Control.Controller

@@ -56,7 +56,7 @@ export class Timeline {
       button("previous", "«", "To the event before", () => this.event(-1)),
       button("back", "‹", "One step back", () => this.step(-1)),
       button("play", "▶", "Play", () => this.toggle()),
-      button("on_by", "›", "One step on", () => this.step(1)),
+      button("forward", "›", "One step on", () => this.step(1)),
       button("next", "»", "To the next event", () => this.event(1)),
       button("now", "Now", "Show the fleet as it is now", () => this.live()),
       this.speeds(),

@@ -70,7 +70,7 @@ defmodule Console.PageEventsTest do
            ]
 
     Browser.run(browser, """
-    window.timeline = { seek: (at_s) => (window.sought = at_s) };
+    window.timeline.seek = (at_s) => (window.sought = at_s);
     document.querySelector('#stages button').click();
     """)
 

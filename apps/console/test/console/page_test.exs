@@ -112,6 +112,7 @@ defmodule Console.PageTest do
 
       # Of all of the floor, so that the landmark's new place is in sight.
       Browser.run(browser, "document.querySelector('[data-fit=all]').click()")
+      Browser.await(browser, "return floor.view.at !== null")
       {x, y} = Live.Trial.scene(live).landmark
 
       Browser.drag(browser, [
@@ -245,9 +246,11 @@ defmodule Console.PageTest do
       browser = open(url)
       Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 2")
 
+      Browser.await(browser, "return !document.getElementById('time').hidden")
+
       # From the top of the page to its end; each that has the focus shows it.
       order =
-        for _stop <- 1..20 do
+        for _stop <- 1..25 do
           Browser.press(browser, [:tab])
 
           Browser.run(browser, """
@@ -259,7 +262,8 @@ defmodule Console.PageTest do
       assert order ==
                ~w(estop mission start stop shape spacing form) ++
                  ["kill leader"] ++
-                 ~w(map 1.3 0.77 fleet all follow trails Legend line Send mag1 tab-robot)
+                 ~w(map 1.3 0.77 fleet all follow trails Legend) ++
+                 ~w(time-previous time-back time-forward time-next strip line Send mag1 tab-robot)
 
       answered = fn text ->
         Browser.await(
@@ -272,7 +276,7 @@ defmodule Console.PageTest do
       to = fn selector ->
         Browser.run(browser, "document.activeElement.blur()")
 
-        Enum.find(1..40, fn _press ->
+        Enum.find(1..60, fn _press ->
           Browser.press(browser, [:tab])
           Browser.run(browser, "return document.activeElement.matches(\"#{selector}\")")
         end) || flunk("no way to #{selector}")
