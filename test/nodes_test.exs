@@ -74,7 +74,7 @@ defmodule System.NodesPageTest do
       )
     end
 
-    Browser.await(browser, "return document.getElementById('acts').className === 'gone'")
+    Browser.await(browser, "return document.getElementById('acts').className === 'gone-robot'")
     assert Browser.errors(browser) == []
     Browser.close(browser)
     assert said =~ "mag1"
