@@ -56,7 +56,12 @@ defmodule Console.About do
     fresh = fresh(entries)
     status = config |> Map.put(:colours, Sim.World.colours()) |> Status.of_board(fresh, board)
     turn = with {%Odometry{twist: twist}, _age_ms} <- fresh[:odometry], do: twist.turn
-    status |> told() |> Map.merge(%{turn: turn}) |> Map.merge(hears(config.profile, fresh))
+
+    layer =
+      with {%{layer: layer}, _age_ms} <- fresh[:mission], do: layer(layer), else: (_idle -> [])
+
+    more = config.profile |> hears(fresh) |> Map.merge(%{turn: turn, layer: layer})
+    status |> told() |> Map.merge(more)
   end
 
   # Readings that are older tell nothing of now.
@@ -106,6 +111,7 @@ defmodule Console.About do
       power: status.power,
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
+      layer: [],
       sonar: [],
       cone: :math.pi() / 12,
       seen: nil,
@@ -138,6 +144,20 @@ defmodule Console.About do
       & &1
     )
   end
+
+  @doc """
+  What a mission draws over the map (`t:Robot.Mission.layer/0`), as the page takes it.
+
+      iex> Console.About.layer([{:polyline, "course", [{0.0, 1.0}]}, {:points, "points", [{2.0, 3.0, "1: 4 s ago"}]}])
+      [%{kind: :polyline, name: "course", points: [[0.0, 1.0]]}, %{kind: :points, name: "points", points: [[2.0, 3.0, "1: 4 s ago"]]}]
+  """
+  @spec layer(Robot.Mission.layer()) :: [%{kind: atom(), name: String.t(), points: [list()]}]
+  def layer(signs),
+    do:
+      for(
+        {kind, name, points} <- signs,
+        do: %{kind: kind, name: name, points: Enum.map(points, &Tuple.to_list/1)}
+      )
 
   @doc "What is known of a robot, as JSON."
   @spec json(atom(), map()) :: String.t()

@@ -25,6 +25,7 @@ export function paint(floor, colour) {
   if (scene) {
     const placed = floor.here().map((r) => [r, colour(scene.robots.indexOf(r))]);
     if (floor.trails) for (const [r, hue] of placed) trail(c, floor, r, hue);
+    for (const sign of floor.about?.layer.length ? floor.about.layer : scene.layer) layer(c, view, sign);
     for (const [r, hue] of placed) doubt(c, view, r, hue);
     for (const [r, hue] of placed) slot(c, view, r, hue);
     for (const [r, hue] of placed) leash(c, floor, r, hue);
@@ -120,6 +121,20 @@ function trail(c, { paths, view }, r, hue) {
   c.lineWidth = 1.5;
   c.stroke();
   c.globalAlpha = 1;
+}
+
+// What the mission draws: lines, and points with their labels.
+function layer(c, view, { kind, points }) {
+  const places = points.map(([x, y]) => view.toPixel(x, y));
+  c.lineWidth = 1.5;
+  if (kind === "polyline") return dashed(c, ink("--dim"), () => places.forEach((place) => c.lineTo(...place)));
+  for (const [k, [x, y]] of places.entries()) {
+    c.strokeStyle = ink("--dim");
+    c.beginPath();
+    c.arc(x, y, 5, 0, 7);
+    c.stroke();
+    text(c, points[k][2], x, y + 19);
+  }
 }
 
 // Where it is in 95 of 100 cases, by its own estimate.
