@@ -71,7 +71,7 @@ defmodule Console.LiveTest do
     assert {:ok, "paused" <> _} = Live.Trial.command(live, {:pace, :pause})
     paused = Live.Trial.scene(live)
     assert {:ok, "7 steps left"} = Live.Trial.command(live, {:pace, {:step, 7}})
-    stepped = until(live, fn _scene, pace -> pace =~ "paused" end)
+    stepped = until(live, fn _scene, pace -> pace.left == 0 end)
     assert stepped.at_ms == paused.at_ms + 700
     assert {:ok, "paused, then 10.0x"} = Live.Trial.command(live, {:pace, {:speed, 10.0}})
     assert {:ok, "10.0x asked"} = Live.Trial.command(live, {:pace, :resume})

@@ -1,6 +1,6 @@
 defmodule Console.PageMapTest do
   @moduledoc "What the map shows of the floor, and what pointers and fingers do to it, in a real browser."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   import Console.PageCase
   alias Console.{Browser, FakeLive}
   @moduletag :realtime
