@@ -150,14 +150,24 @@ defmodule Console.About do
 
       iex> Console.About.layer([{:polyline, "course", [{0.0, 1.0}]}, {:points, "points", [{2.0, 3.0, "1: 4 s ago"}]}])
       [%{kind: :polyline, name: "course", points: [[0.0, 1.0]]}, %{kind: :points, name: "points", points: [[2.0, 3.0, "1: 4 s ago"]]}]
+      iex> Console.About.layer([{:cells, "mapped", 1.6, [{0.8, 0.8}]}])
+      [%{kind: :cells, name: "mapped", size: 1.6, points: [[0.8, 0.8]]}]
   """
-  @spec layer(Robot.Mission.layer()) :: [%{kind: atom(), name: String.t(), points: [list()]}]
-  def layer(signs),
-    do:
-      for(
-        {kind, name, points} <- signs,
-        do: %{kind: kind, name: name, points: Enum.map(points, &Tuple.to_list/1)}
-      )
+  @spec layer(Robot.Mission.layer()) :: [%{atom() => term()}]
+  def layer(signs), do: Enum.map(signs, &sign/1)
+
+  defp sign({kind, name, points}), do: %{kind: kind, name: name, points: lists(points)}
+
+  defp sign({:cells, name, size, places}),
+    do: %{kind: :cells, name: name, size: size, points: lists(places)}
+
+  # To the centimetre.
+  defp lists(tuples) do
+    for tuple <- tuples do
+      for value <- Tuple.to_list(tuple),
+          do: if(is_float(value), do: Float.round(value, 2), else: value)
+    end
+  end
 
   @doc "What is known of a robot, as JSON."
   @spec json(atom(), map()) :: String.t()

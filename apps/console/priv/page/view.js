@@ -50,7 +50,7 @@ export class View {
 
   holds([x, y]) {
     const [px, py] = this.toPixel(x, y);
-    return px > 4 && py > 4 && px < this.size.w - 4 && py < this.size.h - 4;
+    return px > 24 && py > 24 && px < this.size.w - 24 && py < this.size.h - 24;
   }
 
   toPixel(x, y) {

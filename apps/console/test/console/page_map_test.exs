@@ -56,7 +56,7 @@ defmodule Console.PageMapTest do
 
     Browser.await(
       browser,
-      "return window.floor.view.holds([7.9, 5.9]) && window.floor.view.holds([-7.9, -5.9])"
+      "return window.floor.view.holds([7.5, 5.5]) && window.floor.view.holds([-7.5, -5.5])"
     )
 
     assert Browser.errors(browser) == []

@@ -59,7 +59,8 @@ defmodule Console.PictureTest do
 
     layer = [
       {:polyline, "course", [{0.0, 0.0}, {3.0, 2.0}]},
-      {:points, "points", [{3.0, 2.0, "1: 4 s ago"}]}
+      {:points, "points", [{3.0, 2.0, "1: 4 s ago"}]},
+      {:cells, "mapped", 1.6, [{0.8, 0.8}, {0.8, 2.4}]}
     ]
 
     document =
@@ -70,6 +71,7 @@ defmodule Console.PictureTest do
 
     assert count(document, "//polyline") == bare + 1
     assert count(document, "//text[.='1: 4 s ago']") == 1
+    assert count(document, "//rect[@fill-opacity]") == 2
   end
 
   test "round bodies are discs, and boxes are boxes" do

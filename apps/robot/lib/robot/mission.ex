@@ -166,12 +166,13 @@ defmodule Robot.Mission do
               {:slot, term()} | {:fault, line :: String.t()} | nil
 
   @typedoc """
-  What a mission draws over the map of its robots, in metres, in the frame of its robot's pose: lines through points, and points with
-  a label, each with a name that says what it is.
+  What a mission draws over the map of its robots, in metres, in the frame of its robot's pose: lines through points, points with a label,
+  and square cells of a size by their middles, each with a name that says what it is.
   """
   @type layer :: [
           {:polyline, name :: String.t(), [Hal.Pose.point()]}
           | {:points, name :: String.t(), [{x :: float(), y :: float(), label :: String.t()}]}
+          | {:cells, name :: String.t(), size_m :: float(), [Hal.Pose.point()]}
         ]
 
   @doc """

@@ -2,14 +2,13 @@ defmodule Console.Picture.Floor do
   @moduledoc false
   # Draws the upper part of a run's picture: walls, each robot's path, where each ended, and where it believes to have ended.
   # Pure.
-  alias Console.Picture.{Account, Colours, Labels, MapView, RunTrack, Svg, Walls}
+  alias Console.Picture.{Account, Colours, Labels, MapView, MissionLayer, RunTrack, Svg, Walls}
   alias Hal.Pose
 
   @aspect 1.25
   @ink "#22262B"
   @landmark "#F2C200"
   @wrong "#C00000"
-  @soft "#5B616B"
   # A slot is looked at in so many directions.
   @looks 8
 
@@ -48,7 +47,7 @@ defmodule Console.Picture.Floor do
       Svg.group([clip_path: "url(#floor)"], [
         grid(box, at),
         Walls.draw(ground, box, scale),
-        Enum.map(track.last.layer, &sign(&1, at)),
+        Enum.map(track.last.layer, &MissionLayer.draw(&1, at)),
         landmark_way(track, at),
         Enum.map(track.first.robots, &way(&1, track, colours, at)),
         Enum.map(track.first.robots, &start(&1, colours, at, scale)),
@@ -210,21 +209,6 @@ defmodule Console.Picture.Floor do
           do: {x + scale * (ahead * c - left * s), y - scale * (ahead * s + left * c)}
 
     Svg.element(:polygon, [points: Svg.points(places)] ++ look)
-  end
-
-  # What the mission draws (`t:Robot.Mission.layer/0`).
-  defp sign({:polyline, _name, points}, at) do
-    look = [fill: "none", stroke: @soft, stroke_width: 1.2, stroke_dasharray: "6 4"]
-    Svg.element(:polyline, [points: points |> Enum.map(at) |> Svg.points()] ++ look)
-  end
-
-  defp sign({:points, _name, points}, at) do
-    look = [r: 3.5, fill: "none", stroke: @soft, stroke_width: 1.2]
-
-    for {x, y, label} <- points, {px, py} = at.({x, y}) do
-      said = Svg.text(label, px + 7, py + 4, font_size: 10, fill: @soft)
-      [Svg.element(:circle, [cx: px, cy: py] ++ look), said]
-    end
   end
 
   defp slots(ground, scene, colours, at, scale) do

@@ -19,6 +19,7 @@ defmodule Lab.Recording.Drawing do
   @dead {0.50, 0.50, 0.50, 1}
   @landmark {0.95, 0.85, 0.10, 1}
   @layer {0.40, 0.40, 0.45, 0.8}
+  @mapped {0.40, 0.40, 0.45, 0.2}
   @slot {0.20, 0.70, 0.30, 0.5}
 
   @typedoc "Each robot's way."
@@ -86,15 +87,18 @@ defmodule Lab.Recording.Drawing do
           do: entity(ns, "place of #{robot.id}", [Drawing.spot({x, y}, @slot)])
         ) ++
         for({x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))) ++
-        for {kind, name, points} <- scene.layer, do: entity(ns, name, sign(kind, points))
+        for sign <- scene.layer, do: entity(ns, elem(sign, 1), sign(sign))
 
     Foxglove.scene_update(entities, [Bodies.delete_all(ns)])
   end
 
   # What the mission draws (`t:Robot.Mission.layer/0`).
-  defp sign(:polyline, points), do: [Bodies.line(points, 0.03, @layer)]
+  defp sign({:polyline, _name, points}), do: [Bodies.line(points, 0.03, @layer)]
 
-  defp sign(:points, points) do
+  defp sign({:cells, _name, size, places}),
+    do: for({x, y} <- places, do: Bodies.cube({{x, y, 0.0}, 0}, {size, size, 0.01}, @mapped))
+
+  defp sign({:points, _name, points}) do
     for {x, y, label} <- points,
         body <- [Drawing.spot({x, y}, @layer), Bodies.text({{x, y, 0.3}, 0}, label, 0.2, @layer)],
         do: body
