@@ -31,12 +31,12 @@ defmodule System.ExampleTest do
 
     said = sh("mix demo --headless --robots 3 --landmark none --mission gather --seed 1", folder)
     assert said =~ "hall, seed 1, gather\n"
-    assert said =~ "The gather of 3 robots has what it wants."
+    assert said =~ "gather: all 3 robots have reached their goal."
 
     assert sh("mix demo --headless --mission gahter", folder, 1) =~ "did you mean gather?"
 
     checked = sh("mix robot.check", folder)
-    assert checked =~ "config/robots/mag1.exs: well"
+    assert checked =~ "config/robots/mag1.exs: valid"
     assert checked =~ ~r/^ +drive +Gather.DeskBase$/m
 
     sh("mix release --quiet", folder)

@@ -99,7 +99,10 @@ defmodule System.NodesWorldTest do
     true = Port.command(port, "start\n")
     {said, status} = ending(port, said)
     assert status in [0, 2]
-    assert said =~ ~r/world_lost.*world_back.*start: accepted.*formed +\w+ and its 1 follower say/s
+
+    assert said =~
+             ~r/world_lost.*world_back.*start: accepted.*formed +\w+ and its 1 follower say/s
+
     assert said =~ ~r/"name":"mag1","alive":true/
     assert said =~ ~r/"name":"min1","alive":true/
   end

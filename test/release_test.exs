@@ -189,7 +189,7 @@ defmodule System.ReleaseTest do
   } do
     environment = [{"ROBOT", "mag1"}, {"CONVOY_SECRET_FILE", Path.join(folder, "secret")}]
     assert {said, 0} = robot(["check"], environment)
-    assert said =~ ~r/robots\/mag1.exs: well/
+    assert said =~ ~r/robots\/mag1.exs: valid/
   end
 
   test "files may have umlauts in their names, whatever the locale", %{folder: folder} do
@@ -207,7 +207,7 @@ defmodule System.ReleaseTest do
     ]
 
     assert {said, 0} = robot(["check"], environment)
-    assert said =~ "#{file}: well"
+    assert said =~ "#{file}: valid"
   end
 
   test "what is wrong is said in a line, and nothing starts", %{folder: folder} do

@@ -57,7 +57,12 @@ defmodule Console.About do
     fresh = fresh(entries)
     status = config |> Map.put(:colours, Sim.World.colours()) |> Status.of_board(fresh, board)
     turn = with {%Odometry{twist: twist}, _age_ms} <- fresh[:odometry], do: twist.turn
-    status |> told() |> Map.merge(%{turn: turn}) |> Map.merge(hears(config.profile, fresh))
+
+    layer =
+      with {%{layer: layer}, _age_ms} <- fresh[:mission], do: layer(layer), else: (_idle -> [])
+
+    more = config.profile |> hears(fresh) |> Map.merge(%{turn: turn, layer: layer})
+    status |> told() |> Map.merge(more)
   end
 
   # Readings that are older tell nothing of now.
@@ -109,6 +114,7 @@ defmodule Console.About do
       power: nil,
       offline: [],
       estop: nil,
+      layer: [],
       sonar: [],
       cone: :math.pi() / 12,
       seen: nil,
@@ -158,6 +164,30 @@ defmodule Console.About do
       ],
       & &1
     )
+  end
+
+  @doc """
+  What a mission draws over the map (`t:Robot.Mission.layer/0`), as the page takes it.
+
+      iex> Console.About.layer([{:polyline, "course", [{0.0, 1.0}]}, {:points, "points", [{2.0, 3.0, "1: 4 s ago"}]}])
+      [%{kind: :polyline, name: "course", points: [[0.0, 1.0]]}, %{kind: :points, name: "points", points: [[2.0, 3.0, "1: 4 s ago"]]}]
+      iex> Console.About.layer([{:cells, "mapped", 1.6, [{0.8, 0.8}]}])
+      [%{kind: :cells, name: "mapped", size: 1.6, points: [[0.8, 0.8]]}]
+  """
+  @spec layer(Robot.Mission.layer()) :: [%{atom() => term()}]
+  def layer(signs), do: Enum.map(signs, &sign/1)
+
+  defp sign({kind, name, points}), do: %{kind: kind, name: name, points: lists(points)}
+
+  defp sign({:cells, name, size, places}),
+    do: %{kind: :cells, name: name, size: size, points: lists(places)}
+
+  # To the centimetre.
+  defp lists(tuples) do
+    for tuple <- tuples do
+      for value <- Tuple.to_list(tuple),
+          do: if(is_float(value), do: Float.round(value, 2), else: value)
+    end
   end
 
   @doc "What is known of a robot, as JSON."

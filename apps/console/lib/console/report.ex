@@ -107,11 +107,11 @@ defmodule Console.Report do
   defp outcome(%{leader: nil, mission: mission} = result, formed?)
        when mission not in [nil, "landmark"] do
     living = Enum.filter(result.fleet, & &1.alive)
-    fleet = "The #{mission} of #{Format.count(length(living), "robot")}"
 
     if formed?,
-      do: "#{fleet} has what it wants.",
-      else: "#{fleet} does not have what it wants" <> short(Enum.reject(living, & &1.formed?))
+      do:
+        "#{mission}: #{all(length(living))} reached #{if(length(living) == 1, do: "its", else: "their")} goal.",
+      else: "#{mission}: the goal is not reached" <> short(Enum.reject(living, & &1.formed?))
   end
 
   defp outcome(%{leader: nil} = result, _formed?),
@@ -142,6 +142,9 @@ defmodule Console.Report do
   end
 
   defp words(state), do: state |> to_string() |> String.replace("_", " ")
+
+  defp all(1), do: "1 robot has"
+  defp all(count), do: "all #{count} robots have"
 
   # The robots that do not claim `formed`, in the mission's own words.
   defp short([]), do: "."

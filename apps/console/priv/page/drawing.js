@@ -1,19 +1,10 @@
 // Draws the map of a FloorView on its canvas. Nothing here changes what it draws.
+import { FONT, dashed, ink, text } from "./ink.js";
+
 const STEPS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 const LINES = 44; // pixels from one line of the grid to the next, at least
 const BAR = 70; // pixels of the scale bar, at least
 export const DOUBT = 2; // metres; a doubt that is larger is told as a number
-const FONT = "12px system-ui, sans-serif";
-
-// The page's colours, read once for each look that the browser has.
-const inks = new Map();
-
-export function ink(name) {
-  const look = matchMedia("(prefers-color-scheme: dark)").matches;
-  const key = name + look;
-  if (!inks.has(key)) inks.set(key, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
-  return inks.get(key);
-}
 
 export function paint(floor, colour) {
   const c = floor.canvas.getContext("2d");
@@ -25,6 +16,7 @@ export function paint(floor, colour) {
   if (scene) {
     const placed = floor.here().map((r) => [r, colour(scene.robots.indexOf(r))]);
     if (floor.trails) for (const [r, hue] of placed) trail(c, floor, r, hue);
+    for (const sign of floor.about?.layer.length ? floor.about.layer : scene.layer) layer(c, view, sign);
     for (const [r, hue] of placed) doubt(c, view, r, hue);
     for (const [r, hue] of placed) slot(c, view, r, hue);
     for (const [r, hue] of placed) leash(c, floor, r, hue);
@@ -84,18 +76,6 @@ function scale(c, { at, size }) {
   text(c, `${step} m`, right - long / 2, y - 5);
 }
 
-// Over whatever is behind it.
-function text(c, words, x, y) {
-  c.font = FONT;
-  c.textAlign = "center";
-  c.lineWidth = 3;
-  c.lineJoin = "round";
-  c.strokeStyle = ink("--panel");
-  c.fillStyle = ink("--text");
-  c.strokeText(words, x, y);
-  c.fillText(words, x, y);
-}
-
 // Where the keyboard points: the middle of the view.
 function cross(c, { size }) {
   const [x, y] = [size.w / 2, size.h / 2];
@@ -119,6 +99,31 @@ function trail(c, { paths, view }, r, hue) {
   c.globalAlpha = 0.45;
   c.lineWidth = 1.5;
   c.stroke();
+  c.globalAlpha = 1;
+}
+
+// What the mission draws: lines, points with their labels, and cells.
+function layer(c, view, { kind, points, size }) {
+  if (kind === "cells") return cells(c, view, points, size);
+  const places = points.map(([x, y]) => view.toPixel(x, y));
+  c.lineWidth = 1.5;
+  if (kind === "polyline") return dashed(c, ink("--dim"), () => places.forEach((place) => c.lineTo(...place)));
+  for (const [k, [x, y]] of places.entries()) {
+    c.strokeStyle = ink("--dim");
+    c.beginPath();
+    c.arc(x, y, 5, 0, 7);
+    c.stroke();
+    text(c, points[k][2], x, y + 19);
+  }
+}
+
+function cells(c, view, places, size) {
+  c.fillStyle = ink("--accent");
+  c.globalAlpha = 0.1;
+  for (const [x, y] of places) {
+    const [left, top] = view.toPixel(x - size / 2, y + size / 2);
+    c.fillRect(left, top, size * view.at.scale, size * view.at.scale);
+  }
   c.globalAlpha = 1;
 }
 
@@ -157,15 +162,6 @@ function leash(c, floor, r, hue) {
     c.moveTo(...floor.toPixel(r.x, r.y));
     c.lineTo(...floor.toPixel(leader.x, leader.y));
   });
-}
-
-function dashed(c, hue, path) {
-  c.strokeStyle = hue;
-  c.setLineDash([3, 3]);
-  c.beginPath();
-  path();
-  c.stroke();
-  c.setLineDash([]);
 }
 
 // The way that the chosen robot takes now, from where it believes to be; its goal is the last of it.

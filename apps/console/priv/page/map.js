@@ -44,7 +44,7 @@ export class FloorView {
 
   // Another floor: what was seen of the former one says nothing.
   fresh() {
-    this.view.at = null;
+    this.view.stale = true;
     this.view.shows ??= "fleet";
   }
 
@@ -90,7 +90,7 @@ export class FloorView {
   // The whole floor, or the fleet.
   showAll(what) {
     this.view.shows = what;
-    this.view.at = null;
+    this.view.stale = true;
     this.draw();
   }
 

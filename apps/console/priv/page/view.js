@@ -9,7 +9,8 @@ export class View {
     this.canvas = canvas;
     this.at = null; // {x, y, scale}: the middle of the picture, pixels a metre
     this.shows = "fleet"; // what it shows by itself, "all" the floor; null where a person has moved it
-    this.blind = true; // whether it was fitted before there was a fleet
+    this.stale = true; // whether that is to be found anew
+    this.blind = true; // whether it was found before there was a fleet
   }
 
   // Takes the canvas's size, and says whether there is one.
@@ -21,7 +22,7 @@ export class View {
       this.canvas.width = Math.round(w * dots);
       this.canvas.height = Math.round(h * dots);
       this.size = { w, h, dots };
-      if (this.shows) this.at = null;
+      this.stale = true;
     }
     return true;
   }
@@ -30,10 +31,11 @@ export class View {
   // is brought back into it.
   fit(floor, places) {
     const [left, bottom, right, top] = floor;
-    if (this.shows === "all") return this.box(floor, 0.95);
-    const first = this.blind && places.length > 0;
-    if (!this.shows || (this.at && !first && places.every((place) => this.holds(place)))) return;
+    const settled = !this.stale && !(this.blind && places.length > 0) && places.every((place) => this.holds(place));
+    if (this.at && (!this.shows || (this.shows === "fleet" && settled))) return;
+    this.stale = false;
     this.blind = places.length === 0;
+    if (this.shows === "all") return this.box(floor, 0.95);
     const [xs, ys] = [places.map(([x]) => x), places.map(([, y]) => y)];
     const fleet = [Math.min(...xs) - ROOM, Math.min(...ys) - ROOM, Math.max(...xs) + ROOM, Math.max(...ys) + ROOM];
     const small = places.length > 0 && fleet[2] - fleet[0] < SHARE * (right - left) && fleet[3] - fleet[1] < SHARE * (top - bottom);
@@ -48,7 +50,7 @@ export class View {
 
   holds([x, y]) {
     const [px, py] = this.toPixel(x, y);
-    return px > 4 && py > 4 && px < this.size.w - 4 && py < this.size.h - 4;
+    return px > 24 && py > 24 && px < this.size.w - 24 && py < this.size.h - 24;
   }
 
   toPixel(x, y) {

@@ -5,6 +5,7 @@ defmodule Console.AboutTest do
   alias Hal.{Odometry, Pose, Twist}
   alias Robot.Board
   alias Swarm.{Member, Status}
+  doctest About
 
   defmodule Silent do
     @moduledoc "Says nothing."

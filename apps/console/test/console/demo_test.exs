@@ -120,7 +120,9 @@ defmodule Console.DemoTest do
     options = Runs.options(line <> " --blobs direct", words)
     {_status, text} = with_io(fn -> Demo.run(options, Lab.Trial) end)
     assert text =~ "Wrote #{options.save_map}"
-    assert text =~ ~r/does not have what it wants: mag1 is not done \(\d+ m² explored, .+\)\./
+
+    assert text =~
+             ~r/explore: the goal is not reached: mag1 is not done \(\d+ m² explored, .+\)\./
 
     assert [_, seen, all, percent] =
              Regex.run(~r/ Seen: (\d+) of the (\d+) m² .+ \((.+) %\)/, text)

@@ -1,6 +1,6 @@
 defmodule Console.PageEventsTest do
   @moduledoc "The page's lists of what happened and of what was ordered, in a real browser."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   import Console.PageCase
   alias Console.{Browser, FakeLive}
   @moduletag :realtime

@@ -1,6 +1,6 @@
 defmodule Console.PageMapTest do
   @moduledoc "What the map shows of the floor, and what pointers and fingers do to it, in a real browser."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   import Console.PageCase
   alias Console.{Browser, FakeLive}
   @moduletag :realtime
@@ -56,7 +56,7 @@ defmodule Console.PageMapTest do
 
     Browser.await(
       browser,
-      "return window.floor.view.holds([7.9, 5.9]) && window.floor.view.holds([-7.9, -5.9])"
+      "return window.floor.view.holds([7.5, 5.5]) && window.floor.view.holds([-7.5, -5.5])"
     )
 
     assert Browser.errors(browser) == []
@@ -131,6 +131,27 @@ defmodule Console.PageMapTest do
       assert Browser.errors(browser) == []
       Browser.close(browser)
     end
+  end
+
+  test "what the mission draws is drawn: its points where they are, and their labels" do
+    layer = [
+      {:polyline, "course", [{2.0, 1.0}, {5.0, 4.0}]},
+      {:points, "points", [{5.0, 4.0, "2: 7 s ago"}]}
+    ]
+
+    {_live, browser} = shown(FakeLive.of(@pair, layer: layer), [:kill])
+
+    assert Browser.run(browser, """
+           const c = window.floor.canvas.getContext("2d"), words = [], to = [];
+           const fillText = c.fillText, arc = c.arc;
+           c.fillText = function (text, ...at) { words.push(text); return fillText.call(this, text, ...at); };
+           c.arc = function (x, y, ...more) { to.push(window.floor.view.toFloor(x, y).map((m) => m.toFixed(2)).join()); return arc.call(this, x, y, ...more); };
+           window.floor.paint();
+           return [words.includes("2: 7 s ago"), to.includes("5.00,4.00")];
+           """) == [true, true]
+
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
   end
 
   test "a robot that cannot move is not sent, and the page says why" do

@@ -78,7 +78,7 @@ defmodule Console.PageMeshTest do
 
     places = Frames.places([lost, far, mag1, mag2, min1, old, mag3, min2, near])
     assert for({id, {0, nil}} <- places, do: id) |> Enum.sort() == [:mag1, :mag2, :mag3, :min1]
-    assert {1, "it has met nobody of the others"} = places.min5
+    assert {1, "it has met none of the others"} = places.min5
     assert places.min6 == places.min5
     assert {_own, "it was started again on its way, and is lost"} = places.min3
     assert {_own, "it does not say in which frame it is"} = places.min4

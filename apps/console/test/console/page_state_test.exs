@@ -1,6 +1,6 @@
 defmodule Console.PageStateTest do
   @moduledoc "What the page shows of robots that cannot do their work, and what it offers for them, in a real browser."
-  use ExUnit.Case, async: true
+  use ExUnit.Case, async: false
   import Console.PageCase
   alias Console.{Browser, FakeLive, Pace}
   @moduletag :realtime

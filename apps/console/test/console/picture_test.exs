@@ -81,6 +81,27 @@ defmodule Console.PictureTest do
              Console.Picture.Film.draw([%{hd(scenes) | map: nil}], "")
   end
 
+  test "what the mission draws stands on the floor" do
+    track = Runs.track("--landmark none --duration 2")
+    bare = track |> Picture.draw({"", ""}) |> parse() |> count("//polyline")
+
+    layer = [
+      {:polyline, "course", [{0.0, 0.0}, {3.0, 2.0}]},
+      {:points, "points", [{3.0, 2.0, "1: 4 s ago"}]},
+      {:cells, "mapped", 1.6, [{0.8, 0.8}, {0.8, 2.4}]}
+    ]
+
+    document =
+      track
+      |> put_in([Access.key!(:last), Access.key!(:layer)], layer)
+      |> Picture.draw({"", ""})
+      |> parse()
+
+    assert count(document, "//polyline") == bare + 1
+    assert count(document, "//text[.='1: 4 s ago']") == 1
+    assert count(document, "//rect[@fill-opacity]") == 2
+  end
+
   test "round bodies are discs, and boxes are boxes" do
     document =
       "--fleet burger:1,mag:1,min:1 --landmark none --duration 5"

@@ -248,7 +248,7 @@ defmodule Lab.Fleet do
     end
   end
 
-  defp list([]), do: "nobody lives"
+  defp list([]), do: "no robot lives"
   defp list([one]), do: "#{one} lives"
   defp list(robots), do: "#{Enum.join(robots, ", ")} live"
 

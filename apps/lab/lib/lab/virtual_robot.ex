@@ -85,11 +85,11 @@ defmodule Lab.VirtualRobot do
   @spec claim(atom()) :: map()
   def claim(id) do
     with {:ok, board} <- Board.find(id),
-         {:ok, %{state: state, claim: claim, ticked_ms: ticked_ms}, at_ms} <-
+         {:ok, %{state: state, claim: claim, ticked_ms: ticked_ms} = mission, at_ms} <-
            Board.fetch(board, :mission, :infinity) do
       claim = timely(state, claim, Board.now(board) - (ticked_ms || at_ms))
       claim = Map.put_new_lazy(claim, :uncertainty, fn -> uncertainty(board) end)
-      claim = Map.put(claim, :believed, believed(board))
+      claim = Map.merge(claim, %{believed: believed(board), layer: mission.layer})
       claim = if Board.latched?(board), do: Map.put(claim, :estop, callers(board)), else: claim
       claim = for {key, why} <- faults(board), why != nil, into: claim, do: {key, why}
 

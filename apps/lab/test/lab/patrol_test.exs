@@ -37,6 +37,19 @@ defmodule Lab.PatrolTest do
     end)
   end
 
+  test "its points stand in the scene with how long ago a robot saw them, and in recordings" do
+    trial = Enum.reduce(1..50, trial(seed: 1), fn _tick, trial -> Trial.step(trial) end)
+    scene = Trial.scene(trial)
+    assert scene.mission == "patrol"
+    assert [{:points, _name, drawn}] = scene.layer
+    assert for({x, y, _label} <- drawn, do: {x, y}) == points()
+
+    assert Enum.all?(drawn, fn {_x, _y, label} -> label =~ ~r/^\d+: (not seen yet|\d+ s ago)$/ end)
+
+    json = 0 |> Lab.Recording.Drawing.scene(scene) |> IO.iodata_to_binary()
+    for {_x, _y, label} <- drawn, do: assert(json =~ label)
+  end
+
   for {map, noise, loss, seed, by} <- [
         {"hall", :off, 0.0, 1, :motivation},
         {"hall", :default, 0.0, 2, :motivation},

@@ -135,6 +135,9 @@ defmodule Missions.Explore do
   def map(mission), do: SharedMap.raster(mission.map)
 
   @impl Robot.Mission
+  def layer(mission), do: [SharedMap.layer(mission.map)]
+
+  @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
 
   def handle({:message, %{kind: :seen, from: from, body: body}}, %{now_ms: now_ms} = mission)

@@ -133,6 +133,17 @@ defmodule Missions.Flock do
   def halted(mission), do: struct!(__MODULE__, mission |> Map.take(@kept) |> Map.to_list())
 
   @impl Robot.Mission
+  def layer(mission) do
+    course = for {leg, {x, y}} <- Enum.sort(mission.course), do: {leg, {x, y}}
+    points = for {leg, {x, y}} <- course, do: {x, y, "#{leg}#{if leg < mission.leg, do: " done"}"}
+
+    [
+      {:polyline, "course", Enum.map(course, &elem(&1, 1))},
+      {:points, "points of the course", points}
+    ]
+  end
+
+  @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
 
   def handle({:message, %{kind: :member, from: from, body: body}}, %{now_ms: now_ms} = mission)

@@ -153,6 +153,17 @@ defmodule Missions.Patrol do
     ]
   end
 
+  @impl Robot.Mission
+  def layer(mission) do
+    points =
+      for {number, {x, y}} <- Enum.sort(mission.points) do
+        age = Ages.words(mission.seen, number, mission.now_ms)
+        {x, y, "#{number + 1}: #{if age == "never", do: "not seen yet", else: "#{age} s ago"}"}
+      end
+
+    [{:points, "points, and how long ago a robot saw them", points}]
+  end
+
   defp result(%{started?: false} = mission, effects), do: {:idle, mission, effects}
   defp result(mission, effects), do: {phase(mission), mission, effects}
 

@@ -329,6 +329,16 @@ defmodule Missions.FlockTest do
     assert map_size(crowd.mission.heard) == 256
   end
 
+  test "it draws its course, and which points of it are done" do
+    options = [course: [{1.0, 2.0}, {3.0, 4.0}], spacing: 1.0, speed: 0.3]
+    {:idle, flock, []} = Flock.init(:mag1, options)
+
+    assert [{:polyline, "course", [{1.0, 2.0}, {3.0, 4.0}]}, {:points, _name, points}] =
+             Flock.layer(%{flock | leg: 2})
+
+    assert points == [{1.0, 2.0, "1 done"}, {3.0, 4.0, "2"}]
+  end
+
   test "alone, or without a course, it arrives by itself" do
     for options <- [[], [course: []]] do
       {runner, stages} =

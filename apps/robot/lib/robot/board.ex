@@ -45,7 +45,7 @@ defmodule Robot.Board do
     4. `{:silent, module}`, with the behaviour or the mission in which it hangs (`nil` for the
        gate); `{:hung, module}` once it was killed for that.
     5. `{module, integer}`, with another number for each call.
-    6. `%{state: :idle or {mission, phase}, claim: map, since_ms: when it came to that state,
+    6. `%{state: :idle or {mission, phase}, claim: map, layer: what it draws, since_ms: when it came to that state,
        ticked_ms: the time of the last percept that the mission handled, options: with which it
        was started}`
     7. `%{mission: {module, options} or nil, changing?: while it is being replaced, says: line for

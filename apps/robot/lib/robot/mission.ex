@@ -165,6 +165,22 @@ defmodule Robot.Mission do
   @callback place(mission :: term(), at_ms :: integer()) ::
               {:slot, term()} | {:fault, line :: String.t()} | nil
 
+  @typedoc """
+  What a mission draws over the map of its robots, in metres, in the frame of its robot's pose: lines through points, points with a label,
+  and square cells of a size by their middles, each with a name that says what it is.
+  """
+  @type layer :: [
+          {:polyline, name :: String.t(), [Hal.Pose.point()]}
+          | {:points, name :: String.t(), [{x :: float(), y :: float(), label :: String.t()}]}
+          | {:cells, name :: String.t(), size_m :: float(), [Hal.Pose.point()]}
+        ]
+
+  @doc """
+  What people are shown over the map of what the mission has to do, such as its points: by the page, in pictures and in recordings
+  of runs. It is asked at each event. Without this callback: nothing.
+  """
+  @callback layer(mission :: term()) :: layer()
+
   @doc "All phases, for files that name one. Without this callback: those of `c:roles/0`."
   @callback phases() :: [atom()]
 
@@ -183,6 +199,7 @@ defmodule Robot.Mission do
                       account: 1,
                       shape: 3,
                       place: 2,
+                      layer: 1,
                       phases: 0,
                       map: 1
 

@@ -4,7 +4,8 @@ defmodule Sim.Scene do
 
   The lockstep run and the live fleet both produce it, so the terminal, the page and the picture
   can draw either. Poses are the true ones, in metres and radians, in the frame `map`; `at_ms`
-  counts simulated milliseconds from the start. `mission` is the name of the mission that most robots run, `nil` if that is not known.
+  counts simulated milliseconds from the start. `mission` is the name of the mission that most robots run, `nil` if that is not known;
+  `layer` is what it draws over the map (`Robot.Mission`).
   """
   alias Hal.Pose
 
@@ -13,6 +14,7 @@ defmodule Sim.Scene do
               [
                 landmark: nil,
                 mission: nil,
+                layer: [],
                 leader: nil,
                 epoch: 0,
                 formation: {:column, 1.0},
@@ -75,6 +77,7 @@ defmodule Sim.Scene do
           robots: [robot()],
           landmark: Pose.point() | nil,
           mission: String.t() | nil,
+          layer: [tuple()],
           leader: atom() | nil,
           epoch: non_neg_integer(),
           formation: {atom(), float()},

@@ -79,7 +79,7 @@ defmodule Console.Live.Fleet do
   defp carry_out({:pace, _command}, _live),
     do:
       {:error,
-       "these robots are processes that go by the real clock; with --speed 1 the demo runs in lockstep, and can be paused"}
+       "live robots run in real time and cannot be paused; with --speed 1 the demo runs in lockstep, and can be"}
 
   # Another shape keeps the current spacing of the robots.
   defp carry_out({:formation, {kind, spacing}}, live) do

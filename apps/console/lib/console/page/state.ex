@@ -1,5 +1,6 @@
 defmodule Console.Page.State do
   @moduledoc "Describes what the page is told of a fleet, as JSON. Pure; metres and radians, to millimetres and milliradians."
+  alias Console.About
   alias Console.Cli.{Condition, Format}
   alias Console.Picture.Floorplan
   alias Console.Pace
@@ -88,6 +89,7 @@ defmodule Console.Page.State do
     %{
       at_s: scene.at_ms / 1000,
       mission: scene.mission,
+      layer: About.layer(scene.layer),
       leader: scene.leader,
       epoch: scene.epoch,
       formation: scene.formation && Tuple.to_list(scene.formation),

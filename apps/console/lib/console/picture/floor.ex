@@ -2,7 +2,7 @@ defmodule Console.Picture.Floor do
   @moduledoc false
   # Draws the upper part of a run's picture: walls, each robot's path, where each ended, and where it believes to have ended.
   # Pure.
-  alias Console.Picture.{Account, Colours, Labels, MapView, RunTrack, Svg, Walls}
+  alias Console.Picture.{Account, Colours, Labels, MapView, MissionLayer, RunTrack, Svg, Walls}
   alias Hal.Pose
 
   @aspect 1.25
@@ -47,6 +47,7 @@ defmodule Console.Picture.Floor do
       Svg.group([clip_path: "url(#floor)"], [
         grid(box, at),
         Walls.draw(ground, box, scale),
+        Enum.map(track.last.layer, &MissionLayer.draw(&1, at)),
         landmark_way(track, at),
         Enum.map(track.first.robots, &way(&1, track, colours, at)),
         Enum.map(track.first.robots, &start(&1, colours, at, scale)),

@@ -18,6 +18,8 @@ defmodule Lab.Recording.Drawing do
   @living {0.20, 0.45, 0.80, 1}
   @dead {0.50, 0.50, 0.50, 1}
   @landmark {0.95, 0.85, 0.10, 1}
+  @layer {0.40, 0.40, 0.45, 0.8}
+  @mapped {0.40, 0.40, 0.45, 0.2}
   @slot {0.20, 0.70, 0.30, 0.5}
 
   @typedoc "Each robot's way."
@@ -75,7 +77,7 @@ defmodule Lab.Recording.Drawing do
     Foxglove.frame_transforms(ns, transforms)
   end
 
-  @doc "Bodies, the landmark, and the places in the formation, all of them each time."
+  @doc "Bodies, the landmark, the places in the formation, and what the mission draws, all of them each time."
   @spec scene(non_neg_integer(), Scene.t()) :: iodata()
   def scene(ns, scene) do
     entities =
@@ -84,9 +86,22 @@ defmodule Lab.Recording.Drawing do
           %{slot: {x, y}} = robot <- scene.robots,
           do: entity(ns, "place of #{robot.id}", [Drawing.spot({x, y}, @slot)])
         ) ++
-        for {x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))
+        for({x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))) ++
+        for sign <- scene.layer, do: entity(ns, elem(sign, 1), sign(sign))
 
     Foxglove.scene_update(entities, [Bodies.delete_all(ns)])
+  end
+
+  # What the mission draws (`t:Robot.Mission.layer/0`).
+  defp sign({:polyline, _name, points}), do: [Bodies.line(points, 0.03, @layer)]
+
+  defp sign({:cells, _name, size, places}),
+    do: for({x, y} <- places, do: Bodies.cube({{x, y, 0.0}, 0}, {size, size, 0.01}, @mapped))
+
+  defp sign({:points, _name, points}) do
+    for {x, y, label} <- points,
+        body <- [Drawing.spot({x, y}, @layer), Bodies.text({{x, y, 0.3}, 0}, label, 0.2, @layer)],
+        do: body
   end
 
   defp entity(ns, id, bodies), do: Bodies.entity(ns, @frame, id, bodies)

@@ -53,6 +53,7 @@ defmodule Lab.Trial.Evaluation do
       landmark: run.world.landmark,
       robots: robots,
       mission: most(for {_id, %{mission: module}} <- Enum.sort(run.claims), do: module),
+      layer: layer(run, leader),
       leader: leader,
       epoch: run.run_log.epoch,
       formation: shape.formation,
@@ -61,6 +62,13 @@ defmodule Lab.Trial.Evaluation do
       estop: run.run_log.estop,
       stages: RunLog.stages(run.run_log)
     }
+  end
+
+  # What the mission of its leader draws, or that of the first robot whose mission draws something.
+  defp layer(run, leader) do
+    Enum.find_value([leader | run.options.robots], [], fn id ->
+      with [_ | _] = layer <- run.claims[id][:layer], do: layer, else: (_nothing -> nil)
+    end)
   end
 
   # What most of the robots do, by the name that people call it.

@@ -37,7 +37,9 @@ defmodule Lab.Trial.Mechanics do
   def claims(trial), do: for(id <- living(trial), do: {id, claim(trial.members[id])})
 
   defp claim(member) do
-    claim = Manual.shown(Runner.state(Member.runner(member)), Member.claim(member))
+    runner = Member.runner(member)
+    claim = Manual.shown(Runner.state(runner), Member.claim(member))
+    claim = Map.put(claim, :layer, Runner.layer(runner))
     claim = Map.put_new(claim, :uncertainty, Member.uncertainty(member))
     claim = Map.put(claim, :believed, Member.believed(member))
     if callers = Member.held(member), do: Map.put(claim, :estop, callers), else: claim

@@ -44,6 +44,19 @@ defmodule Missions.Explore.SharedMap do
   @spec area(t()) :: float()
   def area(%__MODULE__{free: free}), do: free * Survey.cell() * Survey.cell()
 
+  @doc """
+  What is drawn of it (`t:Robot.Mission.layer/0`): the tiles of which something is known.
+
+      iex> Missions.Explore.SharedMap.layer(%{Missions.Explore.SharedMap.new() | tiles: %{{0, -1} => <<1>>}})
+      {:cells, "mapped", 1.6, [{0.8, -0.8}]}
+  """
+  @spec layer(t()) :: {:cells, String.t(), size_m :: float(), [Pose.point()]}
+  def layer(%__MODULE__{tiles: tiles}) do
+    size = @tile * Survey.cell()
+    middles = for {i, j} <- Enum.sort(Map.keys(tiles)), do: {(i + 0.5) * size, (j + 0.5) * size}
+    {:cells, "mapped", size, middles}
+  end
+
   @doc "How good the map is by what the robot itself has heard, to be added to what it says; `nil` without a wall."
   @spec good(t()) :: String.t() | nil
   def good(%__MODULE__{survey: survey}) do

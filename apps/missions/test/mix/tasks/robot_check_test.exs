@@ -15,7 +15,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
     path = Path.join(@robots, "mag1.exs")
     Check.run([path])
     lines = said()
-    assert hd(lines) =~ "#{path}: well"
+    assert hd(lines) =~ "#{path}: valid"
     text = Enum.join(lines, "\n")
     assert text =~ "mag1, a Magellan Pro of 20 kg: 0.40 m long"
     missing = "distance (units per metre), angle (units per radian): it will not arm"
@@ -74,7 +74,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
       "[id: :mag1, profile: :magellan, drive: {Hal.RFlex.Driver, #{options}}#{keys}]"
     end
 
-    assert {": well", text} = checked(folder, file.(well, []))
+    assert {": valid", text} = checked(folder, file.(well, []))
     refute text =~ "WARNING"
 
     pose = fn n -> "{0.2, #{n / 100}, 0.0}" end
@@ -100,7 +100,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
            "body.irs: 1 of the 2 poses are given twice"}
         ] do
       assert {title, text} = checked(folder, file)
-      assert title =~ ": well, but for "
+      assert title =~ ": valid, "
       assert text =~ "WARNING " <> line
     end
   end
@@ -217,7 +217,7 @@ defmodule Mix.Tasks.Robot.CheckTest do
         write(path, policies)
         Check.run([path])
         lines = said()
-        assert hd(lines) =~ "#{path}: well"
+        assert hd(lines) =~ "#{path}: valid"
         assert Enum.any?(lines, &(&1 =~ ~r/mission +#{told}$/))
         assert {0, answer, []} = ReleaseBoot.answer("check", machine)
         assert Enum.map(answer, &String.trim/1) == Enum.map(lines, &String.trim/1)

@@ -379,6 +379,7 @@ defmodule Robot.Control.Pilot do
      %{
        state: s.state,
        claim: Runner.claim(s.runner),
+       layer: Runner.layer(s.runner),
        since_ms: s.since_ms,
        ticked_ms: s.runner.ticked_ms,
        options: s.options

@@ -31,9 +31,9 @@ defmodule Robot.File.Summary do
 
     title =
       case length(odd) do
-        0 -> "#{path}: well"
-        1 -> "#{path}: well, but for 1 warning below"
-        n -> "#{path}: well, but for #{n} warnings below"
+        0 -> "#{path}: valid"
+        1 -> "#{path}: valid, 1 warning below"
+        n -> "#{path}: valid, #{n} warnings below"
       end
 
     [title | lines(robot)] ++ Enum.flat_map(odd, &row({:WARNING, &1}))
@@ -80,7 +80,7 @@ defmodule Robot.File.Summary do
         measured: conversions(robot.drive, judgement),
         moves: moves(profile),
         stops: stops(profile),
-        feels: senses(body, judgement),
+        has: senses(body, judgement),
         head: robot.ptz && device(robot.ptz),
         camera: robot.camera && device(robot.camera),
         lidar: robot.scan && device(robot.scan),
@@ -189,7 +189,7 @@ defmodule Robot.File.Summary do
 
   defp moves(profile) do
     "at most #{rate(profile.max_linear, "m/s")} and #{degrees(profile.max_turn)} a second; " <>
-      "gathers speed with #{rate(profile.max_acceleration, "m/s2")}"
+      "accelerates at #{rate(profile.max_acceleration, "m/s2")}"
   end
 
   # v t + v^2 / 2a, where t is the time that a stop may take to reach the wheels.

@@ -133,6 +133,13 @@ defmodule Robot.Mission.Runner do
   def explain(%__MODULE__{module: module, mission: mission}),
     do: if(function_exported?(module, :explain, 1), do: module.explain(mission), else: [])
 
+  @doc "What the mission draws over the map (`c:Robot.Mission.layer/1`); `[]` for one that draws nothing."
+  @spec layer(t()) :: Mission.layer()
+  def layer(%__MODULE__{module: nil}), do: []
+
+  def layer(%__MODULE__{module: module, mission: mission}),
+    do: if(function_exported?(module, :layer, 1), do: module.layer(mission), else: [])
+
   @doc "The map that the mission has made, also one that a stop has left; `nil` of one that makes none."
   @spec map(t()) :: Nav.MapFile.Writer.raster() | nil
   def map(%__MODULE__{module: nil, halted: nil}), do: nil

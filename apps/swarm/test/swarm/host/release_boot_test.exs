@@ -189,7 +189,7 @@ defmodule Swarm.Host.ReleaseBootTest do
       path = Path.expand("../../../../../config/robots/#{id}.exs", __DIR__)
       environment = Map.merge(environment, %{"ROBOT" => id, "CONVOY_ROBOT_FILE" => path})
       assert {0, [first | _], []} = ReleaseBoot.answer("check", environment)
-      assert first =~ path <> ": well"
+      assert first =~ path <> ": valid"
     end
   end
 
@@ -329,6 +329,6 @@ defmodule Swarm.Host.ReleaseBootTest do
     assert {0, ["" <> first, "mag1, a Magellan Pro" <> _ | _], []} =
              ReleaseBoot.answer("check", environment)
 
-    assert first == environment["CONVOY_ROBOT_FILE"] <> ": well"
+    assert first == environment["CONVOY_ROBOT_FILE"] <> ": valid"
   end
 end

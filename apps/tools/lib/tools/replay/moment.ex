@@ -101,7 +101,7 @@ defmodule Tools.Replay.Moment do
     within =
       if uncertainty, do: ", within #{metres(uncertainty.radius)} in 95 of 100 cases", else: ""
 
-    "believes to be at #{pose(pose)}#{within}"
+    "estimates its pose as #{pose(pose)}#{within}"
   end
 
   defp sees(nil), do: "no fresh picture"

@@ -95,5 +95,5 @@ defmodule Console.Live.Mesh.Frames do
     do: "its file has it start where #{twins[id]} does, so that one of them is wrong"
 
   defp why(%{frame: %{within: {leader, _number}}}, _twins), do: "it follows #{leader}"
-  defp why(_status, _twins), do: "it has met nobody of the others"
+  defp why(_status, _twins), do: "it has met none of the others"
 end
