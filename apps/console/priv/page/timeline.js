@@ -2,7 +2,7 @@
 // fleet that runs the page keeps what it was shown; a recording is asked for its own.
 import { by, made, write } from "./dom.js";
 import { colour } from "./map.js";
-import { ink } from "./drawing.js";
+import { ink } from "./ink.js";
 
 const FINE = 600; // scenes that are kept as they come
 const KEPT = 2400; // scenes in all: of those before, every second one is dropped when there are more
@@ -41,6 +41,7 @@ export class Timeline {
     this.label = made("output", "", { id: "at" });
     this.section.replaceChildren(this.buttons(), this.canvas);
     this.clear(false);
+    this.section.hidden = true;
     this.canvas.onpointerdown = (e) => (this.canvas.setPointerCapture(e.pointerId), (this.dragged = true), this.pointed(e));
     this.canvas.onpointermove = (e) => (this.dragged ? this.pointed(e) : this.hint(e));
     this.canvas.onpointerup = this.canvas.onpointercancel = () => (this.dragged = false);
@@ -83,7 +84,8 @@ export class Timeline {
     this.past = this.then = this.newest = null; // the time that a person looks at instead of now, and its scene
     this.run = recorded ? { last_s: 0, known_s: 0, playing: false } : null;
     this.robots = [];
-    this.section.hidden = !recorded;
+    // From the beginning, so that the map does not change its size under a pointer.
+    this.section.hidden = false;
     this.play.hidden = this.speed.hidden = !recorded;
     this.now.hidden = true;
     this.draw();
@@ -105,7 +107,6 @@ export class Timeline {
       this.scenes = thinned([...this.scenes, scene]);
     }
     this.newest = scene;
-    this.section.hidden = this.scenes.length < 2;
     this.draw();
     return this.past === null ? scene : this.then;
   }

@@ -319,6 +319,8 @@ defmodule Console.PageTest do
       # What asks first does so in its place, and the emergency stop works meanwhile.
       to.("#reset")
       Browser.press(browser, [:enter])
+      # The answer to the stop before stands there still.
+      Browser.run(browser, "document.getElementById('answer').textContent = ''")
       Browser.press(browser, [:f8])
       answered.("estop: accepted")
       Browser.press(browser, [:enter])

@@ -57,8 +57,10 @@ defmodule Console.Browser do
       {^port, {:data, more}} ->
         said = said <> more
 
-        case Regex.run(~r/started successfully on port (\d+)/, said) do
+        case Regex.run(~r/started successfully on port (\d+)|Address already in use/, said) do
           [_all, number] -> number
+          # It chose a port for both families, and another program was faster on one of them.
+          [_taken] -> driver()
           nil -> listening(port, said)
         end
     after
