@@ -27,34 +27,19 @@ defmodule Console.Picture do
     plot? = track.landmark != [] or track.errors != []
     total = if plot?, do: plot_y + @plot_height + 52, else: plot_y - 16
 
-    [
-      ~s(<?xml version="1.0" encoding="UTF-8"?>\n),
-      Svg.element(
-        :svg,
+    Svg.document(@width, total, [
+      Svg.text(title, @margin, 34, font_size: 18, font_weight: "bold", fill: @ink),
+      Svg.text(settings, @margin, 54, font_size: 13, fill: @ink),
+      Svg.group(
         [
-          xmlns: "http://www.w3.org/2000/svg",
-          width: @width,
-          height: total,
-          viewBox: "0 0 #{@width} #{round(total)}",
-          font_family: "DejaVu Sans, Verdana, Helvetica, sans-serif"
+          transform:
+            "translate(#{@margin + round((@floor_width - (right - left) * scale) / 2)} #{@top})"
         ],
-        [
-          Svg.element(:rect, width: @width, height: total, fill: "#FFFFFF"),
-          Svg.text(title, @margin, 34, font_size: 18, font_weight: "bold", fill: @ink),
-          Svg.text(settings, @margin, 54, font_size: 13, fill: @ink),
-          Svg.group(
-            [
-              transform:
-                "translate(#{@margin + round((@floor_width - (right - left) * scale) / 2)} #{@top})"
-            ],
-            Floor.draw(ground, track, box, scale)
-          ),
-          Svg.group([transform: "translate(#{@width - @margin - @legend} #{@top})"], legend),
-          if(plot?, do: plot(track, plot_y), else: [])
-        ]
+        Floor.draw(ground, track, box, scale)
       ),
-      "\n"
-    ]
+      Svg.group([transform: "translate(#{@width - @margin - @legend} #{@top})"], legend),
+      if(plot?, do: plot(track, plot_y), else: [])
+    ])
   end
 
   defp plot(track, y) do

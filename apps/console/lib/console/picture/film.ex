@@ -61,33 +61,18 @@ defmodule Console.Picture.Film do
     plot_y = @top + height + 34
     total = if plot?, do: round(plot_y + @plot_height + 48), else: round(@top + height + @margin)
 
-    [
-      ~s(<?xml version="1.0" encoding="UTF-8"?>\n),
-      Svg.element(
-        :svg,
-        [
-          xmlns: "http://www.w3.org/2000/svg",
-          width: @width,
-          height: total,
-          viewBox: "0 0 #{@width} #{total}",
-          font_family: "DejaVu Sans, Verdana, Helvetica, sans-serif"
-        ],
-        [
-          Svg.element(:rect, width: @width, height: total, fill: "#FFFFFF"),
-          Svg.text(title, @margin, 32, font_size: 17, font_weight: "bold", fill: @ink),
-          Svg.group(
-            [transform: "translate(#{@margin} #{@top})"],
-            floor(ground, track, film, box)
-          ),
-          Svg.group(
-            [transform: "translate(#{@width - @margin - @beside} #{@top})"],
-            happened(track, film)
-          ),
-          if(plot?, do: plot(track, film, plot_y), else: [])
-        ]
+    Svg.document(@width, total, [
+      Svg.text(title, @margin, 32, font_size: 17, font_weight: "bold", fill: @ink),
+      Svg.group(
+        [transform: "translate(#{@margin} #{@top})"],
+        floor(ground, track, film, box)
       ),
-      "\n"
-    ]
+      Svg.group(
+        [transform: "translate(#{@width - @margin - @beside} #{@top})"],
+        happened(track, film)
+      ),
+      if(plot?, do: plot(track, film, plot_y), else: [])
+    ])
   end
 
   defp at({x, y}, {left, _bottom, _right, top}, scale),

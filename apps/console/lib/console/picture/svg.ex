@@ -14,6 +14,26 @@ defmodule Console.Picture.Svg do
     if children, do: [open, ">", children, "</", name, ">"], else: [open, "/>"]
   end
 
+  @doc "A whole drawing of this size, in pixels, on white."
+  @spec document(number(), number(), iodata()) :: iodata()
+  def document(width, height, children) do
+    [
+      ~s(<?xml version="1.0" encoding="UTF-8"?>\n),
+      element(
+        :svg,
+        [
+          xmlns: "http://www.w3.org/2000/svg",
+          width: width,
+          height: height,
+          viewBox: "0 0 #{round(width)} #{round(height)}",
+          font_family: "DejaVu Sans, Verdana, Helvetica, sans-serif"
+        ],
+        [element(:rect, width: width, height: height, fill: "#FFFFFF") | children]
+      ),
+      "\n"
+    ]
+  end
+
   @doc "A line of text at a place."
   @spec text(String.t(), number(), number(), keyword()) :: iodata()
   def text(content, x, y, attributes \\ []),

@@ -89,17 +89,18 @@ defmodule Swarm.Comms.Joystick do
 
   @doc """
   Whether a refusal is news: it is told once while the button is held, when it comes a second time, because the first word of a hand
-  may be refused for want of a person who is there (`presence:`), as whom it counts from then on.
+  may be refused for want of a person who is there (`presence:`), as whom it counts from then on. The button must be let go then: one that
+  is held through an emergency stop does not drive after the reset.
 
       iex> alias Swarm.Comms.Joystick
       iex> {false, joystick} = Joystick.refused(%Joystick{button: :pressed}, "mag1 is not armed")
       iex> {true, joystick} = Joystick.refused(joystick, "mag1 is not armed")
-      iex> Joystick.refused(joystick, "mag1 is not armed") |> elem(0)
-      false
+      iex> {Joystick.refused(joystick, "mag1 is not armed") |> elem(0), joystick.button}
+      {false, :spent}
   """
   @spec refused(t(), String.t()) :: {news? :: boolean(), t()}
   def refused(%__MODULE__{refused: {line, :heard}} = joystick, line),
-    do: {true, %{joystick | refused: {line, :told}}}
+    do: {true, %{joystick | refused: {line, :told}, button: :spent}}
 
   def refused(%__MODULE__{refused: {line, :told}} = joystick, line), do: {false, joystick}
   def refused(joystick, line), do: {false, %{joystick | refused: {line, :heard}}}

@@ -92,19 +92,23 @@ defmodule Swarm.Comms.JoystickTest do
   defp drives(id), do: told(id, &(&1 > 0.1))
   defp stands(id), do: told(id, &(&1 == 0))
 
-  # So long no speed but zero is told.
-  defp still(id, looks \\ 10)
-  defp still(_id, 0), do: :ok
-
-  defp still(id, looks) do
+  # From now on no speed but zero is told, twenty times in a row.
+  defp still(id) do
     pid = Names.whereis(id, :drive)
+    heard(pid)
 
+    for _look <- 1..20 do
+      assert_receive {:drive, {:drive, twist}, ^pid}, 1_000
+      assert Twist.zero?(twist)
+    end
+  end
+
+  # What was told until now.
+  defp heard(pid) do
     receive do
-      {:drive, {:drive, twist}, ^pid} ->
-        assert Twist.zero?(twist)
-        still(id, looks)
+      {:drive, _said, ^pid} -> heard(pid)
     after
-      50 -> still(id, looks - 1)
+      0 -> :ok
     end
   end
 
@@ -139,14 +143,23 @@ defmodule Swarm.Comms.JoystickTest do
     still(id)
     refute_received {[:swarm, :comms, :joystick], %{line: ^line}}
     eventually(fn -> Swarm.arm(id) == :ok end)
-    drives(id)
+    # What was held meanwhile is let go first.
+    still(id)
+    again(hand, id)
     eventually(fn -> Swarm.estop() == :ok end)
     stands(id)
     assert_receive {[:swarm, :comms, :joystick], %{line: held}}, 10_000
     assert held =~ "held by the emergency stop"
-    still(id)
-    hand.(stick(0, 0, false))
     eventually(fn -> Swarm.reset() == :ok end)
+    still(id)
+    again(hand, id)
+  end
+
+  defp again(hand, id) do
+    hand.(stick(0, 0, false))
+    still(id)
+    hand.(stick(0.3, 0, true))
+    drives(id)
   end
 
   test "a hand at it is a person who is there" do
