@@ -105,6 +105,18 @@ defmodule Mix.Tasks.Robot.CheckTest do
     end
   end
 
+  test "a network of other names is summarised", %{tmp_dir: folder} do
+    drive = ~s(drive: {Hal.RFlex.Driver, port: "/dev/null"})
+
+    network =
+      ~s(network: [interface: "10.0.0.7", multicast: false, peers: ["10.0.0.8:4370"], fleet: ["mag1", "tb1"]])
+
+    {_title, text} = checked(folder, "[id: :mag1, profile: :magellan, #{drive}, #{network}]")
+    assert text =~ "fleet of mag1, tb1"
+    assert text =~ "peers: 1"
+    assert text =~ "no multicast"
+  end
+
   test "for several files, the errors of each are reported, and the status is 1", %{
     tmp_dir: folder
   } do

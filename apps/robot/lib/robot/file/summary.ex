@@ -294,8 +294,10 @@ defmodule Robot.File.Summary do
       {:interface, ip} -> "on #{:inet.ntoa(ip)}"
       {:multicast, false} -> "no multicast"
       {:multicast, {ip, port}} -> "multicast #{:inet.ntoa(ip)}:#{port}"
-      {:peers, peers} -> "#{length(peers)} peers"
-      {key, value} -> "#{key} #{value}"
+      {:fleet, names} -> "fleet of #{Enum.join(names, ", ")}"
+      {key, values} when is_list(values) -> "#{key}: #{length(values)}"
+      {key, value} when is_binary(value) -> "#{key} #{value}"
+      {key, value} -> "#{key} #{inspect(value)}"
     end)
   end
 
