@@ -94,7 +94,7 @@ defmodule Tools.ReplayTest do
     stages = Enum.flat_map(history.entries, & &1.stages)
     assert [:search, :elected | _] = Enum.map(stages, & &1.stage)
     assert %{at_s: 15.0, robot: dead} = Enum.find(stages, &(&1.stage == :killed))
-    assert [0.0, 0.5, 1.0 | _] = Enum.map(history.entries, & &1.at_s)
+    assert [+0.0, 0.5, 1.0 | _] = Enum.map(history.entries, & &1.at_s)
     assert %{entries: [_last]} = Replay.Live.history(live, history.count - 1)
 
     # As far as was asked for, once it had been read.

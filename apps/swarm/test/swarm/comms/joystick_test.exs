@@ -20,7 +20,13 @@ defmodule Swarm.Comms.JoystickTest do
   end
 
   test "only a held button drives, and the first look after it is let go is a word to stand" do
-    assert [nil, {:move, 0.3, 0.5, 0.28}, {:move, 0.0, 0.0, 0.28}, {:move, 0.0, 0.0, 0.28}, nil] =
+    assert [
+             nil,
+             {:move, 0.3, 0.5, 0.28},
+             {:move, +0.0, +0.0, 0.28},
+             {:move, +0.0, +0.0, 0.28},
+             nil
+           ] =
              words([
                {0, stick(0.3, 0.5, false)},
                {100, stick(0.3, 0.5, true)},
@@ -31,7 +37,7 @@ defmodule Swarm.Comms.JoystickTest do
   end
 
   test "a button that was down before it was heard, or through a silence, must be let go first" do
-    assert [nil, nil, nil, {:move, 0.3, 0.0, 0.28}, nil, nil, nil, {:move, 0.3, 0.0, 0.28}] =
+    assert [nil, nil, nil, {:move, 0.3, +0.0, 0.28}, nil, nil, nil, {:move, 0.3, +0.0, 0.28}] =
              words([
                {0, stick(0.3, 0, true)},
                {100, stick(0.3, 0, true)},
