@@ -9,6 +9,7 @@ defmodule Hal.NetworkCamera do
 
   @period_ms 100
   @comment 60_000
+  @comments 8
   # Darker than this is black, and brighter than this white.
   @black 60
   @white 200
@@ -54,8 +55,9 @@ defmodule Hal.NetworkCamera do
     words = ~w(-v error -f lavfi -i #{source} -frames:v 1 -c:v mjpeg -f mjpeg pipe:1)
     {<<0xFF, 0xD8, rest::binary>>, 0} = System.cmd("ffmpeg", words)
 
-    # A comment makes it as large as those of cameras are: ffmpeg reads so many bytes before it begins.
-    <<0xFF, 0xD8, 0xFF, 0xFE, @comment + 2::16, 0::size(@comment)-unit(8), rest::binary>>
+    # Comments make it as large as those of good cameras are: ffmpeg reads so many bytes before it begins, and ffmpeg 7 the most.
+    comment = <<0xFF, 0xFE, @comment + 2::16, 0::size(@comment)-unit(8)>>
+    <<0xFF, 0xD8>> <> :binary.copy(comment, @comments) <> rest
   end
 
   @impl GenServer
