@@ -26,6 +26,8 @@ defmodule Docs.Checks do
     "bin/test-on bookworm --fresh" => @tests,
     "bin/test-on trixie --fresh" => @tests,
     "bin/setup" => @system,
+    "mix scenario examples/course/tour.exs" =>
+      "it needs a solution, which test/course_test.exs brings",
     "cp -r examples/gather ../ours" => @example,
     "cd ../ours && export CONVOY=../convoy && mix demo --mission gather --landmark none" =>
       @example,
@@ -116,7 +118,6 @@ defmodule Docs.Checks do
     "tools -> console -> lab -> record",
     "tools --> console --> lab --> record",
     "Swarm.Supervisor (rest_for_one",
-    "camera -> Hal.Device",
     "idle -> search -> agree",
     "Comms --Transport",
     "camera          Hal.Device      BlobDetector",
@@ -141,6 +142,7 @@ defmodule Docs.Checks do
     "config/robots/mag1.exs:7: limits.max_liner",
     "config/robots/mag1.exs:9: map: /home",
     "refused mag3 at",
+    "import Config",
     "mag1  pid 3308",
     "mag1 has real drivers",
     # Files.
