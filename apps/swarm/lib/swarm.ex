@@ -215,6 +215,18 @@ defmodule Swarm do
          do: ask(id, :sonar) || {:error, "#{id} does not answer"}
   end
 
+  @doc """
+  What a robot's mission draws over the map (`t:Robot.Mission.layer/0`), wherever it is; `[]` of one that draws nothing. The error says
+  why it is not known, such as that it is more than is sent at once.
+
+      Swarm.layer(:mag1)
+  """
+  @spec layer(robot()) :: {:ok, Robot.Mission.layer()} | {:error, line :: String.t()}
+  def layer(robot) do
+    with {:ok, [id]} <- Commands.robots([robot]),
+         do: ask(id, :layer) || {:error, "#{id} does not answer"}
+  end
+
   @doc "Which robot hears which, as a table in `iex`."
   @spec matrix() :: Matrix.t()
   def matrix, do: Matrix.new(status())

@@ -161,12 +161,14 @@ function show(next) {
   floor.setScene(scene);
   if (scene.beside) other.setScene(scene.beside);
   const fleet = by("fleet");
+  const real = floor.map.offers.includes("arm");
   const parts = [
     timeline.past !== null && "looking back",
-    scene.formation && `${scene.at_s.toFixed(1)} s`,
+    !real && `${scene.at_s.toFixed(1)} s`,
     scene.pace,
+    real && scene.mission,
     scene.formation && `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
-    scene.formation ? null : `${scene.robots.filter((r) => r.alive).length} robots heard`,
+    real && `${scene.robots.filter((r) => r.alive).length} robots heard`,
     scene.leader ? `${scene.leader} leads` : "no leader",
     scene.error && `${scene.formed ? "formed" : "position error"} ${scene.error.map((e) => e.toFixed(2)).join("/")} m`,
   ];
@@ -285,7 +287,7 @@ by("estop").onclick = estop;
 press(by("reset"), () => say("reset"), refuse);
 // What is in force goes on with the options that it has; another mission is named.
 press(by("start"), () => say(ordered("mission") ? `start ${by("mission").value}`.trim() : "start"), refuse);
-press(by("form"), () => (ordered("shape", "spacing"), say(`formation ${by("shape").value} ${by("spacing").value}`)), refuse);
+press(by("form"), () => (ordered("shape", "spacing"), say(`formation ${by("shape").value} ${by("spacing").value}`.trim())), refuse);
 press(by("drive"), () => drive(!driving), refuse);
 by("speed").onchange = () => (ordered("speed"), say(`speed ${by("speed").value}`));
 by("camera").onclick = () => camera.show(camera.on ? null : chosen);

@@ -102,6 +102,32 @@ defmodule Lab.FleetTest do
     stop(fleet)
   end
 
+  test "what keeps a robot from its work is in the scene: a fault, devices that are offline" do
+    fleet = fleet(%{robots: [:mag77], landmark: :none, mission: false})
+    robot = fn -> hd(Fleet.scene(fleet).robots) end
+    eventually(fn -> robot.().state == :idle end)
+    assert {robot.().fault, robot.().offline} == {nil, []}
+
+    {:ok, board} = Board.find(:mag77)
+    condition = &Robot.Devices.health(board, {:health, &1, {&2, Board.now(board)}})
+    condition.(:ptz, {:offline, :silent})
+    condition.(:camera, {:offline, :enoent})
+    eventually(fn -> robot.().offline == [:camera, :ptz] end)
+    condition.(:ptz, :online)
+    eventually(fn -> robot.().offline == [:camera] end)
+
+    # What the executive writes when it stands for a fault, until its next tick.
+    {:ok, doing, _at_ms} = Board.fetch(board, :doing, :infinity)
+
+    eventually(fn ->
+      doing = %{doing | fault: "both bumpers are pressed"}
+      _written? = Board.put(board, :executive, :doing, doing, Board.now(board))
+      robot.().fault == "both bumpers are pressed"
+    end)
+
+    stop(fleet)
+  end
+
   defmodule Ending do
     @moduledoc "A backend whose run cannot go on once it is told so."
     alias Lab.Fleet.Local

@@ -46,7 +46,7 @@ defmodule Console.Live.Fleet do
   # A process of its own has its board there.
   defp elsewhere(robot, living) do
     with true <- robot in living, %Swarm.Status{} = status <- Swarm.status(robot) do
-      About.of_status(status)
+      status |> About.of_status() |> About.with_layer(Swarm.layer(robot))
     else
       _dead_or_unknown -> nil
     end

@@ -191,7 +191,8 @@ defmodule Tools.Replay.Live do
          else: (_dead_or_nothing_yet -> About.nothing())
   end
 
-  defp about_of(_robots, _robot), do: About.nothing()
+  defp about_of(%Lab.Replay.Robots{} = replay, robot),
+    do: About.with_layer(About.nothing(), {:ok, Lab.Replay.Robots.layer(replay, robot)})
 
   defp why(name, here, state), do: Moment.lines(%Options{why: name}, here, state.names)
 
