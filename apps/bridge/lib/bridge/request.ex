@@ -75,7 +75,7 @@ defmodule Bridge.Request do
   defp number(request, field) do
     case request do
       %{^field => number} when is_number(number) and abs(number) < 1.0e6 ->
-        {:ok, :erlang.float_to_binary(number * 1.0, [:short])}
+        {:ok, :erlang.float_to_binary(number * 1.0, [:compact, decimals: 6])}
 
       _other ->
         expected(field, "a number", request[field])
