@@ -325,33 +325,36 @@ defmodule Bridge.FoxgloveTest do
     assert {_tf, _other} = await(other, &with({2, <<1, 1::32-little, _::bytes>>} <- &1, do: true))
   end
 
-  test "keeps nobody waiting for a client that reads nothing, which hears its own orders" do
+  test "keeps nobody waiting for a client that reads nothing, carries out its stop, and drops it" do
     %{url: url, live: live, page: page} = serve()
-    # Cells of a map large enough to fill what the sockets hold.
+    # Scenes large enough to fill what the sockets hold.
     robots = for n <- 1..400, do: {:"mag#{n}", {1.0, 2.0}, []}
     FakeLive.change(live, fn _scene -> scene(robots) end)
     {slow, advertised, services} = viewer(url)
     subscriptions = for %{"id" => id} <- advertised["channels"], do: %{id: id, channelId: id}
     slow = say(slow, %{op: "subscribe", subscriptions: subscriptions})
     {other, advertised, _services} = viewer(url)
+    tf = %{id: 1, channelId: channel(advertised, "/tf")}
+    other = say(other, %{op: "subscribe", subscriptions: [tf]})
+    hub = Bridge.Hub.of(page)
+    clients = fn -> map_size(:sys.get_state(hub).broker.clients) end
+    assert clients.() == 2
 
-    other =
-      say(other, %{
-        op: "subscribe",
-        subscriptions: [%{id: 1, channelId: channel(advertised, "/tf")}]
-      })
-
-    # Twenty periods of the other one.
-    for _nth <- 1..20, reduce: other do
-      other -> elem(await(other, &with({2, <<1, 1::32-little, _::bytes>>} <- &1, do: true)), 1)
-    end
-
+    # Until the door has dropped it; a hundred periods are twenty seconds.
+    other = served(other, fn nth -> nth > 20 end)
     estop = Enum.find(services["services"], &(&1["name"] == "/estop"))["id"]
     _slow = say(slow, <<2, estop::32-little, 1::32-little, 4::32-little, "json">>)
     told(live, :estop)
-    hub = Bridge.Hub.of(page)
+    _other = served(other, fn nth -> nth > 200 or clients.() == 1 end)
+    assert clients.() == 1
     assert {:message_queue_len, few} = Process.info(hub, :message_queue_len)
     assert few < 10
+  end
+
+  # Reads its poses until a function of their number says that it is enough.
+  defp served(client, enough?, nth \\ 1) do
+    {_tf, client} = await(client, &with({2, <<1, 1::32-little, _::bytes>>} <- &1, do: true))
+    if enough?.(nth), do: client, else: served(client, enough?, nth + 1)
   end
 
   @tag skip: Judge.why_not()
