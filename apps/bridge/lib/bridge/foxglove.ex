@@ -335,11 +335,22 @@ defmodule Bridge.Foxglove do
     do: {state, [text(parameters(Map.take(values, names), id))]}
 
   def values({:set, asked, _id} = call, values, state) do
-    kind = asked["formation"] || values["formation"]
+    asked =
+      Map.new(asked, fn {name, value} ->
+        {if(name == "formation", do: "kind", else: name), value}
+      end)
 
-    case Request.line("/formation", %{"kind" => kind, "spacing" => asked["spacing"]}, []) do
-      {:ok, line} -> {state, [{:order, line, call}]}
-      {:error, line} -> answer(call, {:error, line}, state)
+    request = Map.merge(%{"kind" => values["formation"]}, asked)
+
+    with {:known, true} <- {:known, request["kind"] != nil},
+         {:ok, line} <- Request.line("/formation", request, []) do
+      {state, [{:order, line, call}]}
+    else
+      {:known, false} ->
+        answer(call, {:error, "the formation is not known here: set it, too"}, state)
+
+      error ->
+        answer(call, error, state)
     end
   end
 

@@ -87,6 +87,63 @@ defmodule Bridge.FoxgloveTest do
              got
   end
 
+  # What a client is told of the subscription, as decoded JSON.
+  defp message(client, id) do
+    await(client, fn
+      {2, <<1, ^id::32-little, _ns::64, payload::bytes>>} -> elem(Bridge.Json.decode(payload), 1)
+      _other -> nil
+    end)
+  end
+
+  test "shows a mesh: what is not in the frame of most is not drawn, and what it tells is logged" do
+    mag1 = {:mag1, {1.0, 2.0}, frame: 0}
+    robots = [mag1, {:mag2, {3.0, 2.0}, frame: 1}, {:mag3, {0.0, 0.0}, pose: nil}]
+    scene = FakeLive.of(robots, map: nil, formation: nil)
+    {:ok, live} = FakeLive.start_link(scene)
+    {:ok, names} = Agent.start_link(fn -> [:mag1] end)
+    robots = fn -> Agent.get(names, & &1) end
+
+    {:ok, _page, url} =
+      Page.start_link(module: FakeLive, live: live, robots: robots, service: Foxglove)
+
+    {client, advertised, _services} = viewer(url)
+
+    asked =
+      for {topic, id} <- Enum.with_index(~w(/tf /map /log /scene)),
+          do: %{id: id, channelId: channel(advertised, topic)}
+
+    client = say(client, %{op: "subscribe", subscriptions: asked})
+    assert {%{"transforms" => [%{"child_frame_id" => "mag1"}]}, client} = message(client, 0)
+
+    line = %{
+      stage: :mesh,
+      at_s: 1.0,
+      n: 1,
+      clock: "14:00:01",
+      robot: :mag1,
+      line: "mag1 is heard"
+    }
+
+    FakeLive.change(live, &%{&1 | stages: [line]})
+    assert {%{"name" => "mag1", "message" => "mag1 is heard"}, client} = message(client, 2)
+
+    Agent.update(names, fn _names -> [:mag1, :mag2] end)
+    {more, client} = op(client, "advertise")
+
+    assert for(%{"topic" => topic} <- more["channels"], do: topic) ==
+             ~w(/mag2/pose /mag2/state /mag2/why /mag2/scan)
+
+    state = channel(more, "/mag2/state")
+    client = say(client, %{op: "subscribe", subscriptions: [%{id: 9, channelId: state}]})
+    assert {%{"phase" => "idle"}, client} = message(client, 9)
+    client = say(client, %{op: "getParameters", parameterNames: []})
+    assert {%{"parameters" => []}, client} = op(client, "parameterValues")
+    set = %{op: "setParameters", parameters: [%{name: "spacing", value: 2}]}
+
+    assert {%{"message" => "the formation is not known here: set it, too"}, _client} =
+             client |> say(set) |> op("status")
+  end
+
   test "says in one line what is wrong, stays open, and goes on with what was right" do
     %{url: url} = serve()
     {client, advertised, _services} = viewer(url)
