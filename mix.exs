@@ -110,7 +110,7 @@ defmodule Convoy.MixProject do
         &{&1, :permanent}
       )
 
-    fleet = robot ++ [sim: :permanent, lab: :permanent, console: :permanent]
+    fleet = robot ++ [sim: :permanent, lab: :permanent, console: :permanent, bridge: :permanent]
 
     [
       robot: Convoy.Release.options(applications: robot),

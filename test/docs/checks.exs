@@ -32,6 +32,8 @@ defmodule Docs.Checks do
     "cd ../ours && export CONVOY=../convoy && mix demo --mission gather --landmark none" =>
       @example,
     "bin/soak 46 1" => @long,
+    "bin/demo --foxglove" => @live,
+    "bin/console --foxglove" => @live,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,

@@ -32,6 +32,7 @@ defmodule Console.Options do
             page_address: {127, 0, 0, 1},
             page_token: nil,
             page_origin: nil,
+            services: [],
             plan: nil,
             headless: false,
             speed: nil,
@@ -203,6 +204,7 @@ the prompt then takes pause, step, speed"},
        "live, also in a browser: the port of the page, or none\n(any that is free)"}
     ] ++
       Page.table(folder) ++
+      Page.services() ++
       [
         {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
          "paint camera pictures, or skip the painting (painted)"}
@@ -216,10 +218,13 @@ the prompt then takes pause, step, speed"},
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
   defp put({"page-token-file", token}, options), do: %{options | page_token: token}
 
-  # The other names in the table are those of the struct.
+  # The other names in the table are those of the struct, or of services.
   defp put({name, value}, options) do
     key = name |> String.replace("-", "_") |> String.to_existing_atom()
-    Map.replace!(options, key, value)
+
+    if is_map_key(options, key),
+      do: Map.replace!(options, key, value),
+      else: %{options | services: Keyword.put(options.services, key, value)}
   end
 
   defp fleet(pairs) do
@@ -318,6 +323,9 @@ the prompt then takes pause, step, speed"},
   end
 
   defp check_speed(other), do: other
+
+  defp check_page({:ok, %{headless: true, services: [{name, _port} | _]}}),
+    do: {:error, ["--#{name} is for a live run, without --headless"]}
 
   defp check_page({:ok, options}) do
     with {:error, line} <-

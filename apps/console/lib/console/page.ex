@@ -14,7 +14,8 @@ defmodule Console.Page do
               that is looked at, a pusher writes the newest scene, as fast as the browser takes it; all end together, and
               the page connects again
 
-  `Console.Page.Access` decides which requests may look and command.
+  `Console.Page.Access` decides which requests may look and command. What speaks another language to other programs is served in
+  the same way (`Console.Page.Service`).
   """
   use Supervisor
   alias Console.Page
@@ -23,7 +24,8 @@ defmodule Console.Page do
   @typedoc """
   `module` and `live` as in `Console.Live`; `robots` are those of the fleet, or a function without arguments that says
   which these are now; `address` (loopback) and `port` (any that is
-  free) to listen on; `token` is demanded where the address is not the loopback's; `origin` is that of a proxy before the page.
+  free) to listen on; `token` is demanded where the address is not the loopback's; `origin` is that of a proxy before the page;
+  `service` is a `Console.Page.Service` that is served instead of the page.
   """
   @type option ::
           {:module, module()}
@@ -33,6 +35,7 @@ defmodule Console.Page do
           | {:port, :inet.port_number()}
           | {:token, String.t() | nil}
           | {:origin, String.t() | nil}
+          | {:service, module() | nil}
 
   @doc """
   Starts it, and says where it is, such as `http://127.0.0.1:40123/`; the error says in one line why there is no page,
@@ -40,19 +43,23 @@ defmodule Console.Page do
   """
   @spec start_link([option()]) :: {:ok, pid(), url :: String.t()} | {:error, line :: String.t()}
   def start_link(options) do
-    options = Map.new([address: {127, 0, 0, 1}, port: 0, token: nil, origin: nil] ++ options)
+    options =
+      Map.new(
+        [address: {127, 0, 0, 1}, port: 0, token: nil, origin: nil, service: nil] ++ options
+      )
 
     with :ok <- server(),
          :ok <- guarded(options),
          {:ok, port} <- free(options),
          {:ok, page} <- Supervisor.start_link(__MODULE__, %{options | port: port}) do
-      {:ok, page, url(options.address, port)}
+      {:ok, page, url(options.service, options.address, port)}
     end
   end
 
   # A browser on this machine need not know its address.
-  defp url({0, 0, 0, 0}, port), do: url({127, 0, 0, 1}, port)
-  defp url(address, port), do: "http://#{:inet.ntoa(address)}:#{port}/"
+  defp url(service, {0, 0, 0, 0}, port), do: url(service, {127, 0, 0, 1}, port)
+  defp url(nil, address, port), do: "http://#{:inet.ntoa(address)}:#{port}/"
+  defp url(_service, address, port), do: "ws://#{:inet.ntoa(address)}:#{port}/"
 
   defp server do
     case Application.ensure_all_started(:mochiweb) do
@@ -98,10 +105,17 @@ defmodule Console.Page do
     page =
       options
       |> Map.take([:token, :origin, :port])
-      |> Map.merge(%{answer: Request, robots: robots, page: self(), session: session})
+      |> Map.merge(%{robots: robots, page: self(), session: session})
+      |> Map.put(:answer, options.service || Request)
 
     door = {Door, options |> Map.take([:address, :port]) |> Map.put(:page, page)}
-    feed = {Feed, Map.take(options, [:module, :live])}
+    source = Map.take(options, [:module, :live])
+
+    feed =
+      if options.service,
+        do: options.service.feed(Map.put(source, :robots, robots)),
+        else: {Feed, source}
+
     Supervisor.init([feed, door], strategy: :one_for_one)
   end
 end

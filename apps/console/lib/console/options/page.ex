@@ -18,6 +18,21 @@ defmodule Console.Options.Page do
     ]
   end
 
+  @about %{
+    foxglove: "serve Foxglove and Lichtblick at this port",
+    rosbridge: "serve programs for ROS at this port, as rosbridge does"
+  }
+
+  @doc "The rows of the services that this build has besides (`Console.Page.Service`)."
+  @spec services() :: [Hal.Cli.Arguments.option()]
+  def services do
+    for {name, {port, _module}} <- Page.Service.all(),
+        do: {"#{name}", "[PORT]", &or_else(&1, port), "#{@about[name]} (#{port})"}
+  end
+
+  defp or_else("", port), do: {:ok, port}
+  defp or_else(text, _port), do: port(text)
+
   @doc "A port from a text."
   @spec port(String.t()) :: {:ok, :inet.port_number()} | {:error, String.t()}
   def port(text) do

@@ -1,8 +1,9 @@
 defmodule Console.Page.Door do
-  @moduledoc false
-  # Lets connections in, each into a process of its own, in which mochiweb answers their requests (`Console.Page.Request`),
-  # and ends those that stay no longer (`Console.Page.Connections`). mochiweb's own server would let in so many, of any
-  # origin, and none after them, and wait 300 s for a first request.
+  @moduledoc """
+  Lets connections in, each into a process of its own, in which mochiweb answers their requests (those of the page in
+  `Console.Page.Request`), and ends those that stay no longer (`Console.Page.Connections`). mochiweb's own server would let in so
+  many, of any origin, and none after them, and wait 300 s for a first request.
+  """
   use GenServer
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_clock, :mochiweb_http]}

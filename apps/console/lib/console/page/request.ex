@@ -3,7 +3,8 @@ defmodule Console.Page.Request do
   # Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
   # scenes as JSON and says its lines (`Console.Page.Line`). Runs in mochiweb's processes, one a connection.
   # Debian's package; without it there is no page.
-  @compile {:no_warn_undefined, [:mochiweb_request, :mochiweb_socket, :mochiweb_websocket]}
+  @compile {:no_warn_undefined, [:mochiweb_socket, :mochiweb_websocket]}
+  import Console.Page.Http
   alias Console.Page
   alias Console.Page.{Client, Door, Feed, Line, State}
   alias Console.About
@@ -26,14 +27,6 @@ defmodule Console.Page.Request do
             {name, {@types[Path.extname(path)], File.read!(path)}}
           end)
 
-  @headers [
-    {"Server", "Convoy"},
-    {"Cache-Control", "no-store"},
-    {"X-Content-Type-Options", "nosniff"},
-    {"Referrer-Policy", "no-referrer"},
-    {"Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'"}
-  ]
-
   # How often a browser is asked for a sign of life, which it gives by itself: an empty ping.
   @ping_ms 5_000
   @ping <<0x89, 0>>
@@ -41,37 +34,15 @@ defmodule Console.Page.Request do
   @doc "Answers one request; `page` has the robots, the door and what guards it (`t:Console.Page.Access.guard/0`)."
   @spec answer(term(), map()) :: term()
   def answer({:mochiweb_request, _state} = request, page) do
-    path = request |> get(:path) |> List.to_string()
-    asked = asked(request, page)
+    case admitted(request, page) do
+      :ok ->
+        Door.note(page.door, :busy)
+        request |> get(:path) |> List.to_string() |> serve(request, page)
+        Door.note(page.door, :idle)
 
-    with "GET" <- request |> get(:method) |> to_string(),
-         :ok <- Page.Access.check(asked, page) |> guessed(asked, page) do
-      Door.note(page.door, :busy)
-      serve(path, request, page)
-      Door.note(page.door, :idle)
-    else
-      {status, line} -> say(request, status, line)
-      method -> say(request, 405, "#{method} is not understood here; GET is")
+      {status, line} ->
+        say(request, status, line)
     end
-  end
-
-  defp guessed(:guess, asked, page) do
-    case Door.guess(page.door, asked.token) do
-      :ok -> :ok
-      :wrong -> {401, "this is not the page's token: open the page with ?token=…"}
-      :late -> {429, "too many wrong tokens came from there: wait some seconds"}
-    end
-  end
-
-  defp guessed(answer, _asked, _page), do: answer
-
-  defp asked(request, page) do
-    %{
-      host: header(request, "Host"),
-      origin: header(request, "Origin"),
-      token: query(request, "token"),
-      session: cookie(request, page)
-    }
   end
 
   defp serve("/live", request, page) do
@@ -194,32 +165,5 @@ defmodule Console.Page.Request do
     if byte_size(text) <= Line.most_bytes() and String.printable?(text),
       do: :ok,
       else: {:error, "this is no line of text of at most #{Prompt.most_bytes()} bytes"}
-  end
-
-  defp say(request, status, line),
-    do: respond(request, status, [{"Content-Type", "text/plain; charset=utf-8"}], line <> "\n")
-
-  defp respond(request, status, headers, body),
-    do: :mochiweb_request.respond({status, headers ++ @headers, body}, request)
-
-  defp get(request, what), do: :mochiweb_request.get(what, request)
-
-  defp header(request, name) do
-    case :mochiweb_request.get_header_value(String.to_charlist(name), request) do
-      :undefined -> nil
-      value -> to_string(value)
-    end
-  end
-
-  defp query(request, name), do: found(:mochiweb_request.parse_qs(request), name)
-
-  # Ports of one host share their cookies.
-  defp cookie(request, page),
-    do: found(:mochiweb_request.parse_cookie(request), cookie_name(page))
-
-  defp cookie_name(page), do: "convoy_#{page.port}"
-
-  defp found(pairs, name) do
-    with {_name, value} <- List.keyfind(pairs, String.to_charlist(name), 0), do: to_string(value)
   end
 end

@@ -114,14 +114,24 @@ defmodule Console.Terminal.Session do
     end
   end
 
-  # The page is a second view; without it the demo goes on.
-  defp page(_session, %{page: :off}), do: []
-
+  # The page and its like are more views; without them the demo goes on.
   defp page(%{module: module, live: live}, options) do
-    where = [port: options.page, address: options.page_address]
-    who = [token: options.page_token, origin: options.page_origin]
+    served = [
+      module: module,
+      live: live,
+      robots: options.robots,
+      address: options.page_address,
+      token: options.page_token,
+      origin: options.page_origin
+    ]
 
-    case Page.start_link([module: module, live: live, robots: options.robots] ++ where ++ who) do
+    page(served, options.page) ++ Page.Service.start(options.services, served)
+  end
+
+  defp page(_served, :off), do: []
+
+  defp page(served, port) do
+    case Page.start_link([port: port] ++ served) do
       {:ok, _page, url} -> ["Page:  " <> url]
       {:error, line} -> ["no page: " <> line]
     end

@@ -33,7 +33,9 @@ defmodule Mix.Tasks.Console do
       {"presence", nil, nil,
        "each key pressed here says that a person looks after the robots\nwhose files ask for that; q ends it (bin/presence)"},
       {"page", "PORT", &Console.Options.Page.port/1, "the port of the page (any that is free)"}
-    ] ++ Console.Options.Page.table(System.get_env("CONVOY_FROM", "."))
+    ] ++
+      Console.Options.Page.table(System.get_env("CONVOY_FROM", ".")) ++
+      Console.Options.Page.services()
   end
 
   defp help do
@@ -63,6 +65,7 @@ defmodule Mix.Tasks.Console do
          {:ok, live} <- Live.Mesh.start_link(connect: expected(options["connect"])),
          {:ok, _page, url} <- Page.start_link(page(options, live)) do
       IO.puts("Page:  " <> url)
+      options |> services() |> Page.Service.start(page(options, live)) |> Enum.each(&IO.puts/1)
       person(options["presence"], live)
     end
   end
@@ -85,6 +88,10 @@ defmodule Mix.Tasks.Console do
       token: options["page-token-file"],
       origin: options["page-origin"]
     ]
+  end
+
+  defp services(options) do
+    for {name, _what} <- Page.Service.all(), port = options["#{name}"], do: {name, port}
   end
 
   defp mesh do

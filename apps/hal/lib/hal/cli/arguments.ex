@@ -4,7 +4,8 @@ defmodule Hal.Cli.Arguments do
 
   Written for values that begin with a minus sign (`--landmark -2,1`), for options that may be
   repeated, and for errors that say what is allowed. An option is `{name, hint, check, help}`: `hint`
-  is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value.
+  is how its value is shown in the help, or `nil` for a switch; `check` turns the text into the value. A value whose hint is in
+  brackets, such as `[PORT]`, may be left out at the end and before another option, and is the text `""` then.
   Every command also takes `--help`, or `-h`.
   """
   alias Hal.Options.Wording
@@ -30,6 +31,9 @@ defmodule Hal.Cli.Arguments do
          ~s(--count: expected a whole number from 1 to 9, got "0"),
          "unknown option --cuont; did you mean --count?"
        ]}
+      iex> port = {"port", "[PORT]", &{:ok, &1}, "where"}
+      iex> Hal.Cli.Arguments.parse(~w(--port --count 3 --port 80), [count, port])
+      {:ok, [{"port", ""}, {"count", 3}, {"port", "80"}]}
   """
   @spec parse([String.t()], [option()]) ::
           {:ok, [{String.t(), term()}]} | {:error, [String.t()]}
@@ -139,6 +143,7 @@ defmodule Hal.Cli.Arguments do
 
   defp valued(option, value, rest, options), do: [checked(option, value) | read(rest, options)]
 
+  defp missing({_name, "[" <> _, _check} = option), do: checked(option, "")
   defp missing({name, hint, _check}), do: {:error, "--#{name} needs a value: #{hint}"}
 
   defp checked({name, _hint, check}, text) do

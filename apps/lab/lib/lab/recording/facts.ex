@@ -95,7 +95,9 @@ defmodule Lab.Recording.Facts do
       )
   end
 
-  defp state(robot, speed) do
+  @doc "How a robot stands, and at what speed it is told to drive, if that is known, as plain JSON."
+  @spec state(Scene.robot(), Twist.t() | nil) :: iodata()
+  def state(robot, speed) do
     facts = [
       phase: robot.state,
       leads: robot.leader?,

@@ -37,6 +37,19 @@ defmodule Lab.Recording.Topics do
     "/paths" => "foxglove.SceneUpdate",
     "/log" => "foxglove.Log"
   }
+  @of_robots [:pose, :state, :blobs]
+  @of_pictures [:camera, :boxes]
+
+  # What a scene says by itself, and how often: a viewer of a live fleet gets the same.
+  @live [
+    {"/map", :once},
+    {"/tf", @poses_ms},
+    {"/scene", @scene_ms},
+    {"/paths", @paths_ms},
+    {"/log", 0},
+    {"/mission", @robots_ms}
+  ]
+  @live_robot [pose: @poses_ms, state: @robots_ms]
 
   @enforce_keys [:channels]
   defstruct @enforce_keys ++ [told: 0, paths: %{}]
@@ -47,17 +60,58 @@ defmodule Lab.Recording.Topics do
           told: non_neg_integer(),
           paths: Drawing.paths()
         }
+  @type key :: String.t() | {robot :: atom(), what :: atom()}
+  @type topic :: {key(), String.t(), Mcap.Channel.schema() | nil}
+
+  @doc "The topics of these robots, with those of pictures or without: key, name, and schema or `nil`, all JSON."
+  @spec list([atom()], pictures? :: boolean()) :: [topic()]
+  def list(robots, pictures?) do
+    kinds = @of_robots ++ if(pictures?, do: @of_pictures, else: [])
+
+    for({topic, name} <- Enum.sort(@schemas), do: {topic, topic, Foxglove.schema(name)}) ++
+      for(topic <- ["/mission", "/messages"], do: {topic, topic, nil}) ++
+      for robot <- robots, what <- kinds, do: Shared.of_robot(robot, what)
+  end
+
+  @doc """
+  Those among them that a scene alone says (`say/4`), each with its period in ms; `/map` is said once, and `/log` when
+  something happens.
+  """
+  @spec live([atom()]) :: [{topic(), every_ms :: non_neg_integer() | :once}]
+  def live(robots) do
+    periods =
+      Map.new(@live ++ for(robot <- robots, {what, ms} <- @live_robot, do: {{robot, what}, ms}))
+
+    for {key, _name, _schema} = topic <- list(robots, false),
+        is_map_key(periods, key),
+        do: {topic, periods[key]}
+  end
+
+  @doc """
+  What a scene says on a topic, at a time in ns; with the robots' ways until then (`Lab.Recording.Drawing.note/2`). `nil` of a
+  robot that it has not.
+  """
+  @spec say(key(), non_neg_integer(), Scene.t(), Drawing.paths()) :: iodata() | nil
+  def say("/map", _ns, scene, _paths), do: scene.map && Drawing.map(scene.map)
+  def say("/tf", ns, scene, _paths), do: Drawing.transforms(ns, scene)
+  def say("/scene", ns, scene, _paths), do: Drawing.scene(ns, scene)
+  def say("/paths", ns, _scene, paths), do: Drawing.paths(ns, paths)
+  def say("/mission", _ns, scene, _paths), do: Facts.mission(scene)
+
+  def say({id, what}, ns, scene, _paths) do
+    with %{} = robot <- Enum.find(scene.robots, &(&1.id == id)) do
+      case what do
+        :pose -> Foxglove.pose_in_frame(ns, "map", robot.pose)
+        :state -> Facts.state(robot, nil)
+      end
+    end
+  end
 
   @doc "Registers the topics, those of pictures if there may be some, and records the start."
   @spec open(Writer.t(), Setup.t(), pictures? :: boolean()) :: {t(), Writer.t(), iodata()}
   def open(writer, setup, pictures? \\ false) do
     {start, ticks, encoding} = Recording.topics()
-    kinds = [:pose, :state, :blobs] ++ if(pictures?, do: [:camera, :boxes], else: [])
-    of_robots = for robot <- setup.robots, what <- kinds, do: Shared.of_robot(robot.id, what)
-
-    topics =
-      for({topic, name} <- Enum.sort(@schemas), do: {topic, topic, Foxglove.schema(name)}) ++
-        for(topic <- ["/mission", "/messages"], do: {topic, topic, nil}) ++ of_robots
+    topics = list(for(robot <- setup.robots, do: robot.id), pictures?)
 
     {channels, writer} =
       (for(topic <- [start, ticks], do: {topic, topic, encoding, nil}) ++
@@ -101,16 +155,15 @@ defmodule Lab.Recording.Topics do
     ns = at_ms * 1_000_000
     news = Scene.news(scene.stages, topics.told)
     paths = Drawing.note(topics.paths, scene)
+    due = [{"/tf", @poses_ms}, {"/scene", @scene_ms}, {"/paths", @paths_ms}]
 
     messages =
       [{ticks, bytes}] ++
-        if(rem(at_ms, @poses_ms) == 0, do: [{"/tf", Drawing.transforms(ns, scene)}], else: []) ++
-        if(rem(at_ms, @scene_ms) == 0, do: [{"/scene", Drawing.scene(ns, scene)}], else: []) ++
-        if(rem(at_ms, @paths_ms) == 0, do: [{"/paths", Drawing.paths(ns, paths)}], else: []) ++
+        for({key, ms} <- due, rem(at_ms, ms) == 0, do: {key, say(key, ns, scene, paths)}) ++
         for(stage <- news, do: {"/log", Facts.stage(ns, stage)}) ++
         Facts.sent(ns, facts, rem(at_ms, @robots_ms) < @poses_ms) ++
         if(rem(at_ms, @robots_ms) == 0,
-          do: [{"/mission", Facts.mission(scene)} | Facts.robots(facts, scene)],
+          do: [{"/mission", say("/mission", ns, scene, paths)} | Facts.robots(facts, scene)],
           else: []
         ) ++
         Enum.flat_map(pictures, &picture(&1, facts.seen))

@@ -85,13 +85,22 @@ defmodule Record.Recording.Drawing do
     spots =
       for {beam, range} when is_number(range) and range < scan.max <- Enum.zip(beams, ranges) do
         %Pose{x: x, y: y} = pose |> Pose.compose(beam) |> Pose.compose(Pose.new(range, 0))
-        Scene.sphere({{x, y, @height}, 0}, {0.05, 0.05, 0.05}, @heard)
+        {x, y}
       end
 
-    [entity(ns, "heard", spots)]
+    [heard(ns, @frame, spots)]
   end
 
   defp heard(_ns, _percept), do: []
+
+  @doc "Where the beams of a lidar or the sonars end, in a frame."
+  @spec heard(non_neg_integer(), frame :: String.t(), [Pose.point()]) :: Scene.entity()
+  def heard(ns, frame, places) do
+    spots =
+      for {x, y} <- places, do: Scene.sphere({{x, y, @height}, 0}, {0.05, 0.05, 0.05}, @heard)
+
+    Scene.entity(ns, frame, "heard", spots)
+  end
 
   defp seen(%{detections: nil}), do: []
 

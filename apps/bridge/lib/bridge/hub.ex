@@ -1,0 +1,214 @@
+defmodule Bridge.Hub do
+  @moduledoc """
+  Asks a fleet ten times a second for what clients asked for, and gives it to their writers that are ready (`Bridge.Broker`).
+  Orders do not pass here, so nothing that hangs here delays one.
+
+  What only a robot knows is asked for beside, one question after the other.
+  """
+  use GenServer
+  alias Bridge.{Broker, Topics}
+  alias Sim.Scene
+
+  @tick_ms 100
+
+  @typedoc "A topic with the number that is its own as long as the hub lives."
+  @type channel :: %{id: pos_integer(), topic: Topics.topic()}
+
+  @doc "Starts it for a fleet (`c:Console.Page.Service.feed/1`)."
+  @spec start_link(%{module: module(), live: term(), robots: (... -> [atom()])}) ::
+          GenServer.on_start()
+  def start_link(source), do: GenServer.start_link(__MODULE__, source)
+
+  @doc "That of a server of the page."
+  @spec of(page :: pid()) :: pid()
+  def of(page) do
+    {__MODULE__, hub, _type, _modules} =
+      page |> Supervisor.which_children() |> List.keyfind(__MODULE__, 0)
+
+    hub
+  end
+
+  @doc """
+  The calling process is a client; returns the fleet and the channels. Those that come later are said as `{:channels, [channel]}`,
+  and messages as `{tag, {ns, payload}}`, to the process that asks for them (`next/2`).
+  """
+  @spec join(pid()) :: {{module(), live :: term()}, [channel()]}
+  def join(hub), do: GenServer.call(hub, :join)
+
+  @doc "A client asks for a topic, each `every_ms` at most; its messages bear the tag."
+  @spec ask(pid(), client :: pid(), Broker.key(), Broker.tag(), non_neg_integer()) :: :ok
+  def ask(hub, client, key, tag, every_ms \\ 0),
+    do: GenServer.cast(hub, {:ask, client, key, tag, every_ms})
+
+  @doc "A client wants no more of a topic."
+  @spec drop(pid(), client :: pid(), Broker.key()) :: :ok
+  def drop(hub, client, key), do: GenServer.cast(hub, {:drop, client, key})
+
+  @doc "Asks for what waits for a client, which comes as `{:messages, [{tag, message}]}` to the caller when there is something."
+  @spec next(pid(), client :: pid()) :: :ok
+  def next(hub, client), do: GenServer.cast(hub, {:next, client, self()})
+
+  @doc "Asks for the parameters, which come as `{:values, ref, %{name => value}}` to the caller."
+  @spec values(pid(), ref :: term()) :: :ok
+  def values(hub, ref), do: GenServer.cast(hub, {:values, ref, self()})
+
+  @doc "Tells in the log what was ordered, and what came of it."
+  @spec ordered(pid(), asker :: String.t(), line :: String.t(), Console.Orders.answer()) :: :ok
+  def ordered(hub, asker, line, answer),
+    do: GenServer.cast(hub, {:ordered, asker, line, answer})
+
+  @impl GenServer
+  def init(source) do
+    s = Map.merge(source, %{broker: Broker.new([{:parameters, :changes}, {:channels, :events}])})
+
+    {:ok,
+     Map.merge(s, %{
+       known: [],
+       channels: [],
+       told: nil,
+       paths: %{},
+       ready: %{},
+       asked: nil,
+       ticking?: false
+     })}
+  end
+
+  @impl GenServer
+  def handle_call(:join, {client, _tag}, s) do
+    _ref = Process.monitor(client)
+    s = grow(s)
+    broker = s.broker |> Broker.join(client) |> Broker.ask(client, :channels, :channels)
+    {:reply, {{s.module, s.live}, s.channels}, tick(%{s | broker: broker})}
+  end
+
+  @impl GenServer
+  def handle_cast({:ask, client, key, tag, every_ms}, s),
+    do: {:noreply, serve(%{s | broker: Broker.ask(s.broker, client, key, tag, every_ms)})}
+
+  def handle_cast({:drop, client, key}, s),
+    do: {:noreply, %{s | broker: Broker.drop(s.broker, client, key)}}
+
+  def handle_cast({:next, client, writer}, s),
+    do: {:noreply, serve(%{s | ready: Map.put(s.ready, client, writer)})}
+
+  def handle_cast({:values, ref, asker}, s) do
+    send(asker, {:values, ref, parameters(s.module.scene(s.live))})
+    {:noreply, s}
+  end
+
+  def handle_cast({:ordered, asker, line, answer}, s) do
+    message = Topics.order(ns(), asker, line, answer)
+    {:noreply, serve(say(s, "/log", message, Hal.Clock.now_ms()))}
+  end
+
+  @impl GenServer
+  def handle_info(:tick, %{broker: %{clients: clients}} = s) when clients == %{},
+    do: {:noreply, %{s | ticking?: false}}
+
+  def handle_info(:tick, s) do
+    now_ms = Hal.Clock.now_ms()
+    s = grow(s)
+    {asking, shown} = s.broker |> Broker.due(now_ms) |> Enum.split_with(&Topics.asks/1)
+
+    s =
+      if shown == [] and not Broker.asked?(s.broker, "/log"), do: s, else: show(s, shown, now_ms)
+
+    {:noreply, s |> question(asking, now_ms) |> serve() |> Map.put(:ticking?, false) |> tick()}
+  end
+
+  def handle_info({ref, abouts}, %{asked: ref} = s) do
+    Process.demonitor(ref, [:flush])
+    now_ms = Hal.Clock.now_ms()
+
+    s =
+      for {key, about} <- abouts, reduce: s do
+        s -> say(s, key, Topics.about(key, ns(), about), now_ms)
+      end
+
+    {:noreply, serve(%{s | asked: nil})}
+  end
+
+  def handle_info({:DOWN, _ref, :process, client, _reason}, s) do
+    broker = Broker.leave(s.broker, client)
+    {:noreply, %{s | broker: broker, ready: Map.delete(s.ready, client)}}
+  end
+
+  defp tick(%{ticking?: true} = s), do: s
+
+  defp tick(s) do
+    _timer = Process.send_after(self(), :tick, @tick_ms)
+    %{s | ticking?: true}
+  end
+
+  # Robots of a mesh come as they are heard.
+  defp grow(s) do
+    case s.robots.() do
+      robots when robots == s.known ->
+        s
+
+      robots ->
+        new = Topics.list(robots) -- for(%{topic: topic} <- s.channels, do: topic)
+        first = length(s.channels) + 1
+        channels = for {topic, id} <- Enum.with_index(new, first), do: %{id: id, topic: topic}
+        broker = Broker.add(s.broker, for(topic <- new, do: {topic.key, topic.pace}))
+        s = %{s | known: robots, channels: s.channels ++ channels, broker: broker}
+        say(s, :channels, channels, Hal.Clock.now_ms(), & &1)
+    end
+  end
+
+  defp show(s, keys, now_ms) do
+    scene = s.module.scene(s.live)
+    at_ns = ns()
+    s = %{s | paths: Topics.ways(s.paths, scene)}
+    news = if s.told, do: Scene.news(scene.stages, s.told), else: []
+    s = Enum.reduce(news, s, &say(&2, "/log", Topics.stage(at_ns, &1), now_ms))
+
+    Enum.reduce(keys, %{s | told: Scene.told(scene.stages)}, fn
+      :parameters, s -> say(s, :parameters, parameters(scene), now_ms, & &1)
+      key, s -> say(s, key, Topics.scene(key, at_ns, scene, s.paths), now_ms)
+    end)
+  end
+
+  defp say(s, key, message, now_ms, wrap \\ &{ns(), IO.iodata_to_binary(&1)}),
+    do: %{s | broker: Broker.say(s.broker, key, message && wrap.(message), now_ms)}
+
+  # The next question waits for the answer to this one.
+  defp question(s, [], _now_ms), do: s
+  defp question(%{asked: ref} = s, _keys, _now_ms) when ref != nil, do: s
+
+  defp question(s, keys, now_ms) do
+    {module, live} = {s.module, s.live}
+
+    task =
+      Task.async(fn ->
+        for {robot, keys} <- Enum.group_by(keys, &Topics.asks/1),
+            about = module.about(live, robot),
+            about != nil,
+            key <- keys,
+            do: {key, about}
+      end)
+
+    broker = Enum.reduce(keys, s.broker, &Broker.say(&2, &1, nil, now_ms))
+    %{s | asked: task.ref, broker: broker}
+  end
+
+  defp serve(s) do
+    Enum.reduce(s.ready, s, fn {client, writer}, s ->
+      if Broker.waiting?(s.broker, client) do
+        {messages, broker} = Broker.take(s.broker, client)
+        send(writer, {:messages, messages})
+        %{s | broker: broker, ready: Map.delete(s.ready, client)}
+      else
+        s
+      end
+    end)
+  end
+
+  # What a person can set of the whole fleet, as far as it is known.
+  defp parameters(%Scene{formation: {kind, spacing}}),
+    do: %{"formation" => Atom.to_string(kind), "spacing" => spacing}
+
+  defp parameters(_unknown), do: %{}
+
+  defp ns, do: System.os_time(:nanosecond)
+end

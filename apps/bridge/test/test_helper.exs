@@ -1,0 +1,1 @@
+Code.require_file("../../../test/start.exs", __DIR__)
