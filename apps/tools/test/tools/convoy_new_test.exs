@@ -5,7 +5,7 @@ defmodule Tools.ConvoyNewTest do
 
   setup %{tmp_dir: folder} do
     project =
-      "defmodule Any.MixProject do\n  use Mix.Project\n  def project, do: [app: :any, version: ~s(0.1.0)]\nend\n"
+      "defmodule Any.MixProject do\n  use Mix.Project\n  def project, do: [app: :any, version: ~s(0.1.0), prune_code_paths: false]\nend\n"
 
     File.write!(Path.join(folder, "mix.exs"), project)
   end
