@@ -33,6 +33,8 @@ defmodule Docs.Checks do
       @example,
     "bin/soak 46 1" => @long,
     "bin/demo --foxglove" => @live,
+    "bin/demo --rmf" => @live,
+    "bin/console --rmf" => @live,
     "bin/console --foxglove" => @live,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
@@ -145,6 +147,7 @@ defmodule Docs.Checks do
     "config/robots/mag1.exs:9: map: /home",
     "refused mag3 at",
     "import Config",
+    "fleet_manager:",
     "mag1  pid 3308",
     "mag1 has real drivers",
     # Files.
