@@ -58,6 +58,12 @@ defmodule Console.Live do
   @doc "What one robot knows and does, as the page shows it (`Console.About`); `nil` if that is not known here."
   @callback about(live :: term(), atom()) :: map() | nil
 
+  @doc """
+  What robots have said to each other of late (`Lab.Messages`), up to the time that is shown; the error says in one line why that is
+  not known here.
+  """
+  @callback messages(live :: term()) :: {:ok, [Lab.Messages.entry()]} | {:error, String.t()}
+
   # A recording has these, too.
 
   @typedoc """
@@ -96,6 +102,7 @@ defmodule Console.Live do
                       notice: 1,
                       status: 2,
                       about: 2,
+                      messages: 1,
                       answer: 2,
                       history: 2,
                       beside: 1

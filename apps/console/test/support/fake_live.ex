@@ -57,6 +57,12 @@ defmodule Console.FakeLive do
   end
 
   @impl Console.Live
+  def messages(live), do: Agent.get(live, &Map.get(&1, :messages, {:ok, []}))
+
+  @doc "What its robots have said to each other."
+  def say(live, messages), do: Agent.update(live, &Map.put(&1, :messages, messages))
+
+  @impl Console.Live
   def pace(live), do: Agent.get(live, & &1.pace)
 
   @doc "How fast it says to go."

@@ -43,6 +43,9 @@ defmodule Console.Live.Fleet do
   @impl Console.Live
   def about(live, robot), do: About.of(robot) || elsewhere(robot, Fleet.living(live))
 
+  @impl Console.Live
+  def messages(live), do: Fleet.messages(live)
+
   # A process of its own has its board there.
   defp elsewhere(robot, living) do
     with true <- robot in living, %Swarm.Status{} = status <- Swarm.status(robot) do

@@ -64,6 +64,12 @@ defmodule Console.Live.Mesh do
   defp layer(live, %Status{from: :robot, robot: robot}), do: GenServer.call(live, {:layer, robot})
   defp layer(_live, _row), do: {:ok, []}
 
+  @impl Console.Live
+  def messages(_live) do
+    {:error,
+     "what real robots say to each other goes from node to node, and not to this one; a recording has it: mix replay FILE --page"}
+  end
+
   defp one(live, robot), do: Enum.find(GenServer.call(live, :statuses), &(&1.robot == robot))
 
   # In the caller's process, so that no robot that is slow to answer delays what is shown.

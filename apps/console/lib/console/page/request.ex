@@ -157,6 +157,7 @@ defmodule Console.Page.Request do
     case Line.order(line, given_us, s.robots.(), s.source) do
       {:ok, order} -> Orders.give(s.orders, %{order | given_us: given_us || heard_us})
       {:look, robot} -> Client.look(s.client, robot)
+      {:messages, on?} -> Client.messages(s.client, on?)
       error -> reply.(State.answer(line, error))
     end
   end

@@ -35,7 +35,7 @@ defmodule Lab.Fleet.Local do
     name = make_ref()
     {:ok, supervisor} = Supervisor.start_link(parts(setup, name, folder), parts_options())
     part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
-    {transport, air} = RadioServer.radio(part.(RadioServer))
+    {transport, air} = RadioServer.radio(part.(RadioServer), self())
     :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
 
     common = %{

@@ -7,7 +7,7 @@ defmodule Lab.Replay.Robots do
   Leader, epoch, `formed` and stages are judged from the missions' claims, as for a live fleet (`Lab.Fleet`).
   """
   @behaviour Lab.Replay.Kind
-  alias Robot.Mission.Runner
+  alias Robot.Mission.{Claim, Letter, Runner}
   alias Robot.Percept
   alias Record.Recording
   alias Record.Recording.Topics
@@ -230,5 +230,12 @@ defmodule Lab.Replay.Robots do
           do: {id, to, Topics.kind(message), nil}
 
     %{sent: sent, speeds: speeds, seen: []}
+  end
+
+  @impl Lab.Replay.Kind
+  def messages(%__MODULE__{}, {_at_ms, entries}) do
+    for {id, {:pilot, :effect, {:send, to, %type{} = message}, _at_ms}} <- entries,
+        type in [Swarm.Message, Letter, Claim],
+        do: {id, to, Swarm.Message.of(id, message)}
   end
 end
