@@ -55,6 +55,9 @@ defmodule Console.Live do
   @doc "Status lines of all its robots, or of one."
   @callback status(live :: term(), :all | atom()) :: [String.t()]
 
+  @doc "The status of each robot that is heard, by its own word; fleets that are not of processes have none."
+  @callback statuses(live :: term()) :: [Swarm.Status.t()]
+
   @doc "What one robot knows and does, as the page shows it (`Console.About`); `nil` if that is not known here."
   @callback about(live :: term(), atom()) :: map() | nil
 
@@ -102,6 +105,7 @@ defmodule Console.Live do
                       notice: 1,
                       status: 2,
                       about: 2,
+                      statuses: 1,
                       messages: 1,
                       answer: 2,
                       history: 2,

@@ -90,5 +90,13 @@ defmodule Console.FakeLive do
   def status(live, _whom), do: live |> scene() |> Console.Cli.Format.everybody()
 
   @impl Console.Live
+  def statuses(live) do
+    for robot <- scene(live).robots, robot.alive do
+      about = Map.take(robot, [:pose, :state, :uncertainty, :frame, :arming, :says, :leader])
+      struct!(%Swarm.Status{robot: robot.id, age_ms: 40}, about)
+    end
+  end
+
+  @impl Console.Live
   def about(_live, _robot), do: nil
 end

@@ -11,7 +11,7 @@ defmodule Bridge.Rmf.Command do
   """
   alias Hal.Pose
 
-  # A `Goto` has arrived within 0.1 m by its own estimate; the true pose of a simulated robot is another.
+  # A `Goto` has arrived within 0.1 m by its own estimate, which may be corrected afterwards.
   @near_m 0.5
   # A robot that moves less between two looks stands.
   @still_m 0.005

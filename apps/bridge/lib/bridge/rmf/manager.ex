@@ -1,13 +1,14 @@
 defmodule Bridge.Rmf.Manager do
   @moduledoc """
-  Keeps what fleet adapters of Open-RMF have commanded (`Bridge.Rmf.Command`), and looks at the fleet ten times a second while one
-  asks. So twenty robots that are each asked for ten times a second cost no robot anything.
+  Keeps what fleet adapters of Open-RMF have commanded (`Bridge.Rmf.Command`), and asks for the status of all robots four times a
+  second while one asks here. So no robot answers ten times a second to an adapter that does ask as often.
   """
   use GenServer
   alias Bridge.Rmf.Command
   alias Hal.Clock
+  alias Swarm.Status
 
-  @tick_ms 100
+  @tick_ms 250
   # An adapter that has not asked for so long is gone.
   @asked_ms 2_000
 
@@ -87,8 +88,7 @@ defmodule Bridge.Rmf.Manager do
 
   defp look(s) do
     at_ms = Clock.now_ms()
-    robots = for robot <- s.module.scene(s.live).robots, robot.alive, do: robot
-    seen = Map.new(robots, &{&1.id, &1})
+    seen = Map.new(statuses(s), &{&1.robot, robot(&1)})
 
     commands =
       Map.new(s.commands, fn {id, command} ->
@@ -100,4 +100,14 @@ defmodule Bridge.Rmf.Manager do
 
     %{s | seen: seen, commands: commands}
   end
+
+  defp statuses(%{module: module, live: live}),
+    do: if(function_exported?(module, :statuses, 1), do: module.statuses(live), else: [])
+
+  # By its own word: one that is lost, or does not answer, has no place.
+  defp robot(%Status{frame: frame, state: state} = status)
+       when frame == :lost or state == :no_answer,
+       do: %{id: status.robot, state: state, pose: nil}
+
+  defp robot(status), do: %{id: status.robot, state: status.state, pose: status.pose}
 end

@@ -41,6 +41,12 @@ defmodule Console.Live.Fleet do
   def status(live, robot), do: live |> scene() |> Format.one(robot)
 
   @impl Console.Live
+  def statuses(live) do
+    living = Fleet.living(live)
+    for status <- Swarm.status(), status.robot in living, do: status
+  end
+
+  @impl Console.Live
   def about(live, robot), do: About.of(robot) || elsewhere(robot, Fleet.living(live))
 
   @impl Console.Live

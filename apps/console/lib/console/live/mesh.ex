@@ -51,7 +51,10 @@ defmodule Console.Live.Mesh do
   end
 
   @impl Console.Live
-  def status(live, :all), do: Enum.map(GenServer.call(live, :statuses), &inspect/1)
+  def statuses(live), do: GenServer.call(live, :statuses)
+
+  @impl Console.Live
+  def status(live, :all), do: Enum.map(statuses(live), &inspect/1)
   def status(live, robot), do: for(%Status{} = one <- [one(live, robot)], do: inspect(one))
 
   @impl Console.Live
@@ -70,7 +73,7 @@ defmodule Console.Live.Mesh do
      "what real robots say to each other goes from node to node, and not to this one; a recording has it: mix replay FILE --page"}
   end
 
-  defp one(live, robot), do: Enum.find(GenServer.call(live, :statuses), &(&1.robot == robot))
+  defp one(live, robot), do: Enum.find(statuses(live), &(&1.robot == robot))
 
   # In the caller's process, so that no robot that is slow to answer delays what is shown.
   @impl Console.Live
