@@ -148,6 +148,8 @@ defmodule Docs.Checks do
     "refused mag3 at",
     "import Config",
     "fleet_manager:",
+    "scrape_configs:",
+    "curl http://127.0.0.1:40123/metrics",
     "mag1  pid 3308",
     "mag1 has real drivers",
     # Files.

@@ -44,6 +44,27 @@ defmodule Lab.FleetTest do
     eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
+  test "a robot counts its way, its stops, how late it decides, and what was started again" do
+    fleet = fleet(%{robots: [:mag74], landmark: :none, mission: false})
+    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag74)) end)
+    place = Pose.place(truth(fleet, :mag74), {0.6, 0.0})
+    assert order(fn -> Swarm.goto(:mag74, place) end) == :ok
+    eventually(fn -> Swarm.status(:mag74).state == :done end)
+    before = Swarm.status(:mag74).meters
+    assert before.distance_m > 0.4 and before.distance_m < 0.8
+    assert before.ticks > 10 and before.restarts.pilot == 0
+
+    assert Swarm.estop() == :ok
+    Process.exit(Names.whereis(:mag74, :pilot), :kill)
+    eventually(fn -> Swarm.status(:mag74).meters.restarts.pilot == 1 end)
+    meters = Swarm.status(:mag74).meters
+    assert meters.restarts.gate == 0
+    assert meters.stops.estop == Map.get(before.stops, :estop, 0) + 1
+    assert meters.distance_m >= before.distance_m
+    Swarm.reset()
+    stop(fleet)
+  end
+
   test "a robot with a lidar goes by its scans, tells what it hears, and stands while they do not come" do
     fleet = fleet(%{robots: [:burger71], landmark: :none, mission: false})
     eventually(fn -> match?({:ok, [_ | _]}, Swarm.sonar(:burger71)) end)

@@ -51,6 +51,8 @@ defmodule Swarm.Status do
   After the age stands where its camera looks (`head`), and what that shows of the landmark (`sees`; `Swarm.Status.Sight`), of
   robots that have a pan-tilt unit and a camera: `looks at 12, 0 deg (zoom 49 deg), sees YellowLandmark at -12 deg, 2.31 m`.
 
+  `meters` are its counts since its board began (`Robot.Meters`); the line does not have them.
+
   A robot whose machine has no network says `NO NETWORK`, and why (`network`; `Mesh.fault/0`).
 
   The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
@@ -104,6 +106,7 @@ defmodule Swarm.Status do
     view: {nil, :view},
     hears: {[], nil},
     network: {nil, nil},
+    meters: {nil, nil},
     rejected: {%{}, :sum},
     age_ms: {nil, :age},
     head: {nil, {:maybe, :head}},
@@ -158,6 +161,7 @@ defmodule Swarm.Status do
           view: view() | nil,
           rejected: %{atom() => pos_integer()},
           network: String.t() | nil,
+          meters: Robot.Meters.counts() | nil,
           head: Sight.head(),
           sees: Sight.t(),
           age_ms: non_neg_integer() | nil
@@ -200,6 +204,8 @@ defmodule Swarm.Status do
     do: %{radius: profile.radius, corners: Hal.Profile.corners(profile)}
 
   defp read(:network, _seen), do: Mesh.fault()
+  defp read(:meters, %{board: %Board{meters: meters}}), do: Robot.Meters.read(meters)
+  defp read(:meters, _in_lockstep), do: nil
   defp read(:state, %{entries: entries}), do: entries |> value(:mission) |> state()
 
   defp read(:mission, %{entries: entries}) do
