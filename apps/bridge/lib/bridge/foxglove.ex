@@ -26,14 +26,14 @@ defmodule Bridge.Foxglove do
   The keys of channels by id, those of subscriptions by id, the robots that the client's channels drive, and the parameters that it watches.
   """
   @type t :: %__MODULE__{
-          channels: %{pos_integer() => Bridge.Topics.key()},
-          subscriptions: %{non_neg_integer() => Bridge.Topics.key()},
+          channels: %{pos_integer() => Bridge.Broker.key()},
+          subscriptions: %{non_neg_integer() => Bridge.Broker.key()},
           advertised: %{non_neg_integer() => atom()},
           watched: [String.t()]
         }
 
   @impl Console.Page.Service
-  def feed(source), do: {Hub, source}
+  def feed(source), do: {Hub, Map.put(source, :catalogue, Bridge.Topics)}
 
   @impl Console.Page.Service
   def answer({:mochiweb_request, _state} = request, page) when is_map(page),
