@@ -52,6 +52,16 @@ defmodule Bridge.Connection do
     end
   end
 
+  @doc """
+  Whether a page was served on this machine.
+
+      iex> for origin <- ["http://localhost:8080", "http://127.0.0.1", "http://localhost.evil.example", "null"],
+      ...>     do: Bridge.Connection.here?(origin)
+      [true, true, false, false]
+  """
+  @spec here?(origin :: String.t()) :: boolean()
+  def here?(origin), do: origin =~ ~r/\Ahttp:\/\/(localhost|127\.0\.0\.1)(:\d+)?\z/
+
   defp offered(request) do
     (header(request, "Sec-WebSocket-Protocol") || "")
     |> String.split(",", trim: true)

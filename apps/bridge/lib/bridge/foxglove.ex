@@ -11,7 +11,7 @@ defmodule Bridge.Foxglove do
   alias Bridge.{Connection, Hub, Json, Request}
 
   @protocols ["foxglove.websocket.v1", "foxglove.sdk.v1"]
-  # Where viewers come from: Foxglove's own site, their desktop programs, and what is served on this machine.
+  # Where viewers come from, besides this machine: Foxglove's own site, and their desktop programs.
   @viewers ["https://app.foxglove.dev", "file://"]
   @most_advertised 64
   @parameters ["formation", "spacing"]
@@ -48,8 +48,7 @@ defmodule Bridge.Foxglove do
   end
 
   @impl Bridge.Dialect
-  def origin?(origin),
-    do: origin in @viewers or origin =~ ~r/\Ahttp:\/\/(localhost|127\.0\.0\.1)(:\d+)?\z/
+  def origin?(origin), do: origin in @viewers or Connection.here?(origin)
 
   @impl Bridge.Dialect
   def new(channels) do
@@ -335,22 +334,9 @@ defmodule Bridge.Foxglove do
     do: {state, [text(parameters(Map.take(values, names), id))]}
 
   def values({:set, asked, _id} = call, values, state) do
-    asked =
-      Map.new(asked, fn {name, value} ->
-        {if(name == "formation", do: "kind", else: name), value}
-      end)
-
-    request = Map.merge(%{"kind" => values["formation"]}, asked)
-
-    with {:known, true} <- {:known, request["kind"] != nil},
-         {:ok, line} <- Request.line("/formation", request, []) do
-      {state, [{:order, line, call}]}
-    else
-      {:known, false} ->
-        answer(call, {:error, "the formation is not known here: set it, too"}, state)
-
-      error ->
-        answer(call, error, state)
+    case Request.set(asked, values) do
+      {:ok, line} -> {state, [{:order, line, call}]}
+      error -> answer(call, error, state)
     end
   end
 
