@@ -8,6 +8,7 @@ defmodule Tools.MixProject do
       native: [nifs: [kernel: ["../../vision/c_src/blobs.c", "kernel_nif.c"]]],
       deps: [
         {:agents, in_umbrella: true},
+        {:bridge, in_umbrella: true},
         {:console, in_umbrella: true},
         {:vm, in_umbrella: true}
       ]
