@@ -74,6 +74,7 @@ defmodule Bridge.Hub do
        paths: %{},
        ready: %{},
        asked: nil,
+       values: [],
        ticking?: false
      })}
   end
@@ -93,13 +94,16 @@ defmodule Bridge.Hub do
   def handle_cast({:drop, client, key}, s),
     do: {:noreply, %{s | broker: Broker.drop(s.broker, client, key)}}
 
-  def handle_cast({:next, client, writer}, s),
-    do: {:noreply, serve(%{s | ready: Map.put(s.ready, client, writer)})}
-
-  def handle_cast({:values, ref, asker}, s) do
-    send(asker, {:values, ref, parameters(s.module.scene(s.live))})
-    {:noreply, s}
+  # One that has gone may still have asked.
+  def handle_cast({:next, client, writer}, s) do
+    if is_map_key(s.broker.clients, client),
+      do: {:noreply, serve(%{s | ready: Map.put(s.ready, client, writer)})},
+      else: {:noreply, s}
   end
+
+  # All of a tick are answered by one scene.
+  def handle_cast({:values, ref, asker}, s),
+    do: {:noreply, %{s | values: [{ref, asker} | s.values]}}
 
   def handle_cast({:ordered, asker, line, answer}, s) do
     {:noreply, s |> log(&s.catalogue.order(&1, ns(), asker, line, answer)) |> serve()}
@@ -115,7 +119,8 @@ defmodule Bridge.Hub do
     {asking, shown} = s.broker |> Broker.due(now_ms) |> Enum.split_with(&s.catalogue.asks/1)
 
     logged? = Enum.any?(s.catalogue.log(), &Broker.asked?(s.broker, &1))
-    s = if shown == [] and not logged?, do: s, else: show(s, shown, now_ms)
+    wanted? = shown != [] or s.values != [] or logged?
+    s = if wanted?, do: show(s, shown, now_ms), else: s
 
     {:noreply, s |> question(asking, now_ms) |> serve() |> Map.put(:ticking?, false) |> tick()}
   end
@@ -163,7 +168,8 @@ defmodule Bridge.Hub do
   defp show(s, keys, now_ms) do
     scene = s.module.scene(s.live)
     at_ns = ns()
-    s = %{s | paths: Drawing.note(s.paths, Catalogue.drawn(scene))}
+    for {ref, asker} <- Enum.reverse(s.values), do: send(asker, {:values, ref, parameters(scene)})
+    s = %{s | values: [], paths: Drawing.note(s.paths, Catalogue.drawn(scene))}
     news = if s.told, do: Scene.news(scene.stages, s.told), else: []
     s = Enum.reduce(news, s, fn stage, s -> log(s, &s.catalogue.stage(&1, at_ns, stage)) end)
 

@@ -5,6 +5,7 @@ defmodule Bridge.RosbridgeTest do
   alias Bridge.{Cbor, Judge, Rosbridge}
   alias Console.{FakeLive, Page}
   @moduletag :realtime
+  @moduletag :capture_log
   @moduletag skip: Console.PageCase.no_server() || false
 
   @examples Path.expand("../../../../examples/python", __DIR__)
