@@ -25,7 +25,12 @@ config :swarm,
 config :swarm, recorder: Record.Recorder
 
 # What bin/demo and bin/console serve to other programs if they are asked to: option, port and module.
-config :console, services: [foxglove: {8765, Bridge.Foxglove}, rmf: {22_011, Bridge.Rmf}]
+config :console,
+  services: [
+    foxglove: {8765, Bridge.Foxglove},
+    rosbridge: {9090, Bridge.Rosbridge},
+    rmf: {22_011, Bridge.Rmf}
+  ]
 
 # What a build adds of its own (docs/extending.md).
 if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

@@ -13,12 +13,15 @@ defmodule Bridge.Connection do
   alias Bridge.{Frames, Hub}
   alias Console.Orders
   alias Console.Page.{Door, Line}
+  alias Mesh.Distribution.Access.Bucket
 
   # As browsers of the page are asked for a sign of life, which they give by themselves.
   @ping_ms 5_000
   # A word of driving lasts so long; then the robot stands.
   @drive_ms 500
-  @most_calls 32
+  # Orders at once, and in the long run; a stop is always heard.
+  @at_once 20
+  @per_minute 600
   # Of a drive its beginning is told.
   @pause_ms 2_000
 
@@ -52,6 +55,16 @@ defmodule Bridge.Connection do
     end
   end
 
+  @doc """
+  Whether a page was served on this machine.
+
+      iex> for origin <- ["http://localhost:8080", "http://127.0.0.1", "http://localhost.evil.example", "null"],
+      ...>     do: Bridge.Connection.here?(origin)
+      [true, true, false, false]
+  """
+  @spec here?(origin :: String.t()) :: boolean()
+  def here?(origin), do: origin =~ ~r/\Ahttp:\/\/(localhost|127\.0\.0\.1)(:\d+)?\z/
+
   defp offered(request) do
     (header(request, "Sec-WebSocket-Protocol") || "")
     |> String.split(",", trim: true)
@@ -77,6 +90,7 @@ defmodule Bridge.Connection do
       frames: %Frames{},
       state: state,
       calls: [],
+      bucket: nil,
       drives: %{}
     }
 
@@ -180,18 +194,21 @@ defmodule Bridge.Connection do
 
   defp effect({:order, line, call}, s) do
     given_us = System.monotonic_time(:microsecond)
+    order = Line.order(line, given_us, s.page.robots.(), s.source)
 
-    case Line.order(line, given_us, s.page.robots.(), s.source) do
-      {:ok, %{kind: kind}} when kind != :stop and length(s.calls) >= @most_calls ->
-        does(s, &s.dialect.answer(call, {:error, "too many orders wait for an answer"}, &1))
+    case {order, Bucket.take(s.bucket, @at_once, @per_minute, Hal.Clock.now_ms())} do
+      {{:ok, %{kind: :stop} = stop}, _bucket} ->
+        given(s, stop, call)
 
-      {:ok, order} ->
-        Orders.give(s.orders, order)
-        %{s | calls: s.calls ++ [{order.line, order.kind, call}]}
+      {_order, :error} ->
+        does(s, &s.dialect.answer(call, {:error, "too many orders: ten a second are heard"}, &1))
 
-      {:error, _line} = error ->
+      {{:ok, order}, {:ok, bucket}} ->
+        given(%{s | bucket: bucket}, order, call)
+
+      {{:error, _line} = error, {:ok, bucket}} ->
         told(s, line, error)
-        does(s, &s.dialect.answer(call, error, &1))
+        does(%{s | bucket: bucket}, &s.dialect.answer(call, error, &1))
     end
   end
 
@@ -216,6 +233,11 @@ defmodule Bridge.Connection do
       do: told(s, "drives #{robot}", {:ok, "begins"})
 
     %{s | drives: Map.put(s.drives, robot, now_ms)}
+  end
+
+  defp given(s, order, call) do
+    Orders.give(s.orders, order)
+    %{s | calls: s.calls ++ [{order.line, order.kind, call}]}
   end
 
   defp answered(s, "drive", {:error, line}), do: does(s, &s.dialect.refused(line, &1))

@@ -11,7 +11,7 @@ defmodule Bridge.Foxglove do
   alias Bridge.{Connection, Hub, Json, Request}
 
   @protocols ["foxglove.websocket.v1", "foxglove.sdk.v1"]
-  # Where viewers come from: Foxglove's own site, their desktop programs, and what is served on this machine.
+  # Where viewers come from, besides this machine: Foxglove's own site, and their desktop programs.
   @viewers ["https://app.foxglove.dev", "file://"]
   @most_advertised 64
   @parameters ["formation", "spacing"]
@@ -26,8 +26,8 @@ defmodule Bridge.Foxglove do
   The keys of channels by id, those of subscriptions by id, the robots that the client's channels drive, and the parameters that it watches.
   """
   @type t :: %__MODULE__{
-          channels: %{pos_integer() => Bridge.Topics.key()},
-          subscriptions: %{non_neg_integer() => Bridge.Topics.key()},
+          channels: %{pos_integer() => Bridge.Broker.key()},
+          subscriptions: %{non_neg_integer() => Bridge.Broker.key()},
           advertised: %{non_neg_integer() => atom()},
           watched: [String.t()]
         }
@@ -36,7 +36,7 @@ defmodule Bridge.Foxglove do
   def scheme, do: "ws"
 
   @impl Console.Page.Service
-  def feed(source), do: {Hub, source}
+  def feed(source), do: {Hub, Map.put(source, :catalogue, Bridge.Topics)}
 
   @impl Console.Page.Service
   def answer({:mochiweb_request, _state} = request, page) when is_map(page),
@@ -51,8 +51,7 @@ defmodule Bridge.Foxglove do
   end
 
   @impl Bridge.Dialect
-  def origin?(origin),
-    do: origin in @viewers or origin =~ ~r/\Ahttp:\/\/(localhost|127\.0\.0\.1)(:\d+)?\z/
+  def origin?(origin), do: origin in @viewers or Connection.here?(origin)
 
   @impl Bridge.Dialect
   def new(channels) do
@@ -338,22 +337,9 @@ defmodule Bridge.Foxglove do
     do: {state, [text(parameters(Map.take(values, names), id))]}
 
   def values({:set, asked, _id} = call, values, state) do
-    asked =
-      Map.new(asked, fn {name, value} ->
-        {if(name == "formation", do: "kind", else: name), value}
-      end)
-
-    request = Map.merge(%{"kind" => values["formation"]}, asked)
-
-    with {:known, true} <- {:known, request["kind"] != nil},
-         {:ok, line} <- Request.line("/formation", request, []) do
-      {state, [{:order, line, call}]}
-    else
-      {:known, false} ->
-        answer(call, {:error, "the formation is not known here: set it, too"}, state)
-
-      error ->
-        answer(call, error, state)
+    case Request.set(asked, values) do
+      {:ok, line} -> {state, [{:order, line, call}]}
+      error -> answer(call, error, state)
     end
   end
 

@@ -6,17 +6,22 @@ defmodule Bridge.Hub do
   What only a robot knows is asked for beside, one question after the other.
   """
   use GenServer
-  alias Bridge.{Broker, Topics}
+  alias Bridge.{Broker, Catalogue}
+  alias Lab.Recording.Drawing
   alias Sim.Scene
 
   @tick_ms 100
 
   @typedoc "A topic with the number that is its own as long as the hub lives."
-  @type channel :: %{id: pos_integer(), topic: Topics.topic()}
+  @type channel :: %{id: pos_integer(), topic: Catalogue.topic()}
 
-  @doc "Starts it for a fleet (`c:Console.Page.Service.feed/1`)."
-  @spec start_link(%{module: module(), live: term(), robots: (... -> [atom()])}) ::
-          GenServer.on_start()
+  @doc "Starts it for a fleet (`c:Console.Page.Service.feed/1`), with what is said of it (`Bridge.Catalogue`)."
+  @spec start_link(%{
+          module: module(),
+          live: term(),
+          robots: (... -> [atom()]),
+          catalogue: module()
+        }) :: GenServer.on_start()
   def start_link(source), do: GenServer.start_link(__MODULE__, source)
 
   @doc "That of a server of the page."
@@ -69,6 +74,7 @@ defmodule Bridge.Hub do
        paths: %{},
        ready: %{},
        asked: nil,
+       values: [],
        ticking?: false
      })}
   end
@@ -88,17 +94,19 @@ defmodule Bridge.Hub do
   def handle_cast({:drop, client, key}, s),
     do: {:noreply, %{s | broker: Broker.drop(s.broker, client, key)}}
 
-  def handle_cast({:next, client, writer}, s),
-    do: {:noreply, serve(%{s | ready: Map.put(s.ready, client, writer)})}
-
-  def handle_cast({:values, ref, asker}, s) do
-    send(asker, {:values, ref, parameters(s.module.scene(s.live))})
-    {:noreply, s}
+  # One that has gone may still have asked.
+  def handle_cast({:next, client, writer}, s) do
+    if is_map_key(s.broker.clients, client),
+      do: {:noreply, serve(%{s | ready: Map.put(s.ready, client, writer)})},
+      else: {:noreply, s}
   end
 
+  # All of a tick are answered by one scene.
+  def handle_cast({:values, ref, asker}, s),
+    do: {:noreply, %{s | values: [{ref, asker} | s.values]}}
+
   def handle_cast({:ordered, asker, line, answer}, s) do
-    message = Topics.order(ns(), asker, line, answer)
-    {:noreply, serve(say(s, "/log", message, Hal.Clock.now_ms()))}
+    {:noreply, s |> log(&s.catalogue.order(&1, ns(), asker, line, answer)) |> serve()}
   end
 
   @impl GenServer
@@ -108,10 +116,11 @@ defmodule Bridge.Hub do
   def handle_info(:tick, s) do
     now_ms = Hal.Clock.now_ms()
     s = grow(s)
-    {asking, shown} = s.broker |> Broker.due(now_ms) |> Enum.split_with(&Topics.asks/1)
+    {asking, shown} = s.broker |> Broker.due(now_ms) |> Enum.split_with(&s.catalogue.asks/1)
 
-    s =
-      if shown == [] and not Broker.asked?(s.broker, "/log"), do: s, else: show(s, shown, now_ms)
+    logged? = Enum.any?(s.catalogue.log(), &Broker.asked?(s.broker, &1))
+    wanted? = shown != [] or s.values != [] or logged?
+    s = if wanted?, do: show(s, shown, now_ms), else: s
 
     {:noreply, s |> question(asking, now_ms) |> serve() |> Map.put(:ticking?, false) |> tick()}
   end
@@ -122,7 +131,7 @@ defmodule Bridge.Hub do
 
     s =
       for {key, about} <- abouts, reduce: s do
-        s -> say(s, key, Topics.about(key, ns(), about), now_ms)
+        s -> say(s, key, s.catalogue.about(key, ns(), about), now_ms)
       end
 
     {:noreply, serve(%{s | asked: nil})}
@@ -147,7 +156,7 @@ defmodule Bridge.Hub do
         s
 
       robots ->
-        new = Topics.list(robots) -- for(%{topic: topic} <- s.channels, do: topic)
+        new = s.catalogue.list(robots) -- for(%{topic: topic} <- s.channels, do: topic)
         first = length(s.channels) + 1
         channels = for {topic, id} <- Enum.with_index(new, first), do: %{id: id, topic: topic}
         broker = Broker.add(s.broker, for(topic <- new, do: {topic.key, topic.pace}))
@@ -159,14 +168,20 @@ defmodule Bridge.Hub do
   defp show(s, keys, now_ms) do
     scene = s.module.scene(s.live)
     at_ns = ns()
-    s = %{s | paths: Topics.ways(s.paths, scene)}
+    for {ref, asker} <- Enum.reverse(s.values), do: send(asker, {:values, ref, parameters(scene)})
+    s = %{s | values: [], paths: Drawing.note(s.paths, Catalogue.drawn(scene))}
     news = if s.told, do: Scene.news(scene.stages, s.told), else: []
-    s = Enum.reduce(news, s, &say(&2, "/log", Topics.stage(at_ns, &1), now_ms))
+    s = Enum.reduce(news, s, fn stage, s -> log(s, &s.catalogue.stage(&1, at_ns, stage)) end)
 
     Enum.reduce(keys, %{s | told: Scene.told(scene.stages)}, fn
       :parameters, s -> say(s, :parameters, parameters(scene), now_ms, & &1)
-      key, s -> say(s, key, Topics.scene(key, at_ns, scene, s.paths), now_ms)
+      key, s -> say(s, key, s.catalogue.scene(key, at_ns, scene, s.paths), now_ms)
     end)
+  end
+
+  defp log(s, words) do
+    now_ms = Hal.Clock.now_ms()
+    Enum.reduce(s.catalogue.log(), s, &say(&2, &1, words.(&1), now_ms))
   end
 
   defp say(s, key, message, now_ms, wrap \\ &{ns(), IO.iodata_to_binary(&1)}),
@@ -177,11 +192,11 @@ defmodule Bridge.Hub do
   defp question(%{asked: ref} = s, _keys, _now_ms) when ref != nil, do: s
 
   defp question(s, keys, now_ms) do
-    {module, live} = {s.module, s.live}
+    {module, live, catalogue} = {s.module, s.live, s.catalogue}
 
     task =
       Task.async(fn ->
-        for {robot, keys} <- Enum.group_by(keys, &Topics.asks/1),
+        for {robot, keys} <- Enum.group_by(keys, &catalogue.asks/1),
             about = module.about(live, robot),
             about != nil,
             key <- keys,

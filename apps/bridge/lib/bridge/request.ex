@@ -64,6 +64,25 @@ defmodule Bridge.Request do
     end
   end
 
+  @doc """
+  The line that sets some of the parameters `formation` and `spacing`, whose values are known as far as `values` has them.
+
+      iex> Bridge.Request.set(%{"spacing" => 2}, %{"formation" => "wedge", "spacing" => 1.0})
+      {:ok, "formation wedge 2.0"}
+      iex> Bridge.Request.set(%{"formation" => "line"}, %{})
+      {:ok, "formation line"}
+      iex> Bridge.Request.set(%{"spacing" => 2}, %{})
+      {:error, "the formation is not known here: set it, too"}
+  """
+  @spec set(%{String.t() => term()}, %{String.t() => term()}) ::
+          {:ok, String.t()} | {:error, String.t()}
+  def set(asked, values) do
+    case Map.get(asked, "formation", values["formation"]) do
+      nil -> {:error, "the formation is not known here: set it, too"}
+      kind -> line("/formation", %{"kind" => kind, "spacing" => asked["spacing"]}, [])
+    end
+  end
+
   defp robot(%{"robot" => name}, robots) do
     if Enum.any?(robots, &(Atom.to_string(&1) == name)),
       do: {:ok, name},

@@ -12,24 +12,15 @@ defmodule Bridge.Topics do
   Poses are those that the fleet's page shows: of a simulated fleet the true ones, of real robots what they believe. Robots
   whose pose is in another frame than that of most are not drawn.
   """
-  alias Lab.Recording.Topics
-  alias Lab.Recording.{Drawing, Facts}
+  @behaviour Bridge.Catalogue
+  alias Bridge.Catalogue
+  alias Lab.Recording.{Facts, Topics}
   alias Mcap.Foxglove
   alias Record.Recording.Drawing, as: Shapes
-  alias Sim.Scene
 
   @of_robots [why: {500, nil}, scan: {200, "foxglove.SceneUpdate"}]
 
-  @type key :: Topics.key()
-  @type topic :: %{
-          key: key(),
-          name: String.t(),
-          schema: Mcap.Channel.schema() | nil,
-          pace: Bridge.Broker.pace()
-        }
-
-  @doc "The topics of a fleet of these robots."
-  @spec list([atom()]) :: [topic()]
+  @impl Bridge.Catalogue
   def list(robots) do
     for({{key, name, schema}, ms} <- Topics.live(robots), do: topic(key, name, schema, ms)) ++
       for robot <- robots, {what, {ms, schema}} <- @of_robots do
@@ -40,27 +31,15 @@ defmodule Bridge.Topics do
   defp topic(key, name, schema, ms),
     do: %{key: key, name: name, schema: schema, pace: if(ms == 0, do: :events, else: ms)}
 
-  @doc "The robot that must be asked for what a topic says (`c:Console.Live.about/2`); `nil` if the scene says it."
-  @spec asks(key()) :: atom() | nil
+  @impl Bridge.Catalogue
   def asks({robot, what}), do: if(Keyword.has_key?(@of_robots, what), do: robot)
   def asks(_of_the_fleet), do: nil
 
-  @doc "What a scene says on a topic at a time in ns, as JSON; `nil` if it says nothing."
-  @spec scene(key(), non_neg_integer(), Scene.t(), Drawing.paths()) :: iodata() | nil
+  @impl Bridge.Catalogue
   def scene({_robot, :state} = key, ns, scene, paths), do: Topics.say(key, ns, scene, paths)
-  def scene(key, ns, scene, paths), do: Topics.say(key, ns, drawn(scene), paths)
+  def scene(key, ns, scene, paths), do: Topics.say(key, ns, Catalogue.drawn(scene), paths)
 
-  @doc "The robots' ways with where they are now."
-  @spec ways(Drawing.paths(), Scene.t()) :: Drawing.paths()
-  def ways(paths, scene), do: Drawing.note(paths, drawn(scene))
-
-  defp drawn(scene) do
-    robots = for %{pose: %{}} = robot <- scene.robots, robot[:frame] in [nil, 0], do: robot
-    %{scene | robots: robots}
-  end
-
-  @doc "What is known of a robot (`Console.About`), as one of its topics says it."
-  @spec about(key(), non_neg_integer(), map()) :: iodata()
+  @impl Bridge.Catalogue
   def about({robot, :scan}, ns, %{sonar: beams}) do
     ends =
       for [x, y, heading, range] <- beams,
@@ -98,15 +77,17 @@ defmodule Bridge.Topics do
   defp in_brackets([]), do: ""
   defp in_brackets(words), do: " (#{Enum.join(words, ", ")})"
 
-  @doc "What happened to a fleet, as a line of its log."
-  @spec stage(non_neg_integer(), Scene.stage()) :: iodata()
-  def stage(ns, %{line: line} = stage), do: Foxglove.log(ns, :info, "#{stage[:robot]}", line)
-  def stage(ns, stage), do: Facts.stage(ns, stage)
+  @impl Bridge.Catalogue
+  def log, do: ["/log"]
 
-  @doc "What a person or a program ordered, and what came of it, as a line of the log."
-  @spec order(non_neg_integer(), asker :: String.t(), line :: String.t(), Console.Orders.answer()) ::
-          iodata()
-  def order(ns, asker, line, {ok?, text}) do
+  @impl Bridge.Catalogue
+  def stage("/log", ns, %{line: line} = stage),
+    do: Foxglove.log(ns, :info, "#{stage[:robot]}", line)
+
+  def stage("/log", ns, stage), do: Facts.stage(ns, stage)
+
+  @impl Bridge.Catalogue
+  def order("/log", ns, asker, line, {ok?, text}) do
     level = if ok? == :ok, do: :info, else: :warning
     Foxglove.log(ns, level, asker, "#{line}: #{text |> List.wrap() |> Enum.join("; ")}")
   end

@@ -5,6 +5,7 @@ defmodule Bridge.FoxgloveTest do
   alias Bridge.{Foxglove, Judge}
   alias Console.{FakeLive, Page}
   @moduletag :realtime
+  @moduletag :capture_log
   @moduletag skip: Console.PageCase.no_server() || false
 
   @v1 ["Sec-WebSocket-Protocol": "foxglove.websocket.v1"]
@@ -273,6 +274,42 @@ defmodule Bridge.FoxgloveTest do
       end)
 
     assert Enum.sort(answered) == Enum.to_list(1..20)
+  end
+
+  test "hears ten orders a second of a client that says more, and each of its stops" do
+    %{url: url, live: live} = serve()
+    {client, _advertised, services} = viewer(url)
+    id = fn name -> Enum.find(services["services"], &(&1["name"] == name))["id"] end
+    goto = ~S({"robot":"mag1","x":1,"y":2})
+
+    client =
+      for call <- 1..200, reduce: client do
+        client ->
+          say(
+            client,
+            <<2, id.("/goto")::32-little, call::32-little, 4::32-little, "json", goto::bytes>>
+          )
+      end
+
+    client = say(client, <<2, id.("/estop")::32-little, 999::32-little, 4::32-little, "json">>)
+
+    {answers, _client} =
+      Enum.map_reduce(1..201, client, fn _nth, client ->
+        await(client, fn
+          {2, <<3, _::32, call::32-little, 4::32-little, "json", answer::bytes>>} ->
+            {:ok, answer} = Bridge.Json.decode(answer)
+            {call, answer["message"]}
+
+          _other ->
+            nil
+        end)
+      end)
+
+    assert {999, "accepted"} in answers
+    assert length(Enum.uniq_by(answers, &elem(&1, 0))) == 201
+    refused = for {_call, "too many orders" <> _} <- answers, do: :refused
+    assert length(refused) in 1..180
+    assert :estop in FakeLive.told(live)
   end
 
   test "drives a robot half a second for each word, and takes no word that is none" do

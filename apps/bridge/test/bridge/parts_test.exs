@@ -4,7 +4,11 @@ defmodule Bridge.PartsTest do
 
   doctest Broker
   doctest Frames
+  doctest Bridge.Cbor
+  doctest Bridge.Connection
   doctest Bridge.Json
+  doctest Bridge.Ros
+  doctest Bridge.Rosapi
   doctest Request
   doctest Topics
 

@@ -12,7 +12,7 @@ defmodule Console.About do
 
   @typedoc """
   `wishes` are all behaviours that wished, with their weights, the chosen one first; `way` are the corners of the way that
-  it takes, and `pose` where it believes to be: `[x, y]` in metres; `notes` are what its status remarks, as in `iex`.
+  it takes, and `pose` and `heading` where it believes to be: `[x, y]` in metres, radians; `notes` are what its status remarks, as in `iex`.
   """
   @type t :: %{atom() => term()}
 
@@ -112,6 +112,7 @@ defmodule Console.About do
       wishes: [],
       way: [],
       pose: nil,
+      heading: nil,
       fault: nil,
       speed: nil,
       turn: nil,
@@ -137,6 +138,7 @@ defmodule Console.About do
       wishes: for({by, weight} <- status.weights, do: [by, weight]),
       way: for({x, y} <- status.way, do: [x, y]),
       pose: with(%Pose{x: x, y: y} <- status.pose, do: [x, y]),
+      heading: with(%Pose{heading: heading} <- status.pose, do: heading),
       fault: status.fault,
       speed: status.speed,
       limits: status.limits,

@@ -7,13 +7,20 @@ defmodule Console.FakeLive do
 
   @doc "Starts it with a scene, and what it offers."
   def start_link(scene, offers \\ [:arm]),
-    do: Agent.start_link(fn -> %{scene: scene, offers: offers, told: [], pace: nil} end)
+    do:
+      Agent.start_link(fn -> %{scene: scene, offers: offers, told: [], pace: nil, about: %{}} end)
 
   @doc "What it was told, the newest last."
   def told(live), do: Agent.get(live, &Enum.reverse(&1.told))
 
   @doc "Changes the scene by a function."
   def change(live, change), do: Agent.update(live, &%{&1 | scene: change.(&1.scene)})
+
+  @doc "Tells what is known of a robot, besides nothing."
+  def know(live, robot, about) do
+    about = Map.merge(Console.About.nothing(), about)
+    Agent.update(live, &put_in(&1.about[robot], about))
+  end
 
   @doc "A scene of robots in an empty hall; each is told by its name, its place and what is special of it."
   def of(robots, more \\ []) do
@@ -98,5 +105,5 @@ defmodule Console.FakeLive do
   end
 
   @impl Console.Live
-  def about(_live, _robot), do: nil
+  def about(live, robot), do: Agent.get(live, & &1.about[robot])
 end

@@ -1,6 +1,6 @@
 defmodule Bench.Page do
   @moduledoc """
-  Measures what the page costs. In turns nobody looks, some browsers do, and some connect and read nothing; they are sockets
+  Measures what the page costs, or what is served in its place (`Console.Page.Service`), whose clients ask for all there is. In turns nobody looks, some browsers do, and some connect and read nothing; they are sockets
   of another VM (`Bench.Page.Browsers`).
 
   How steadily robots tick is measured on a fleet of processes; their own work changes by more than the page takes, so
@@ -22,7 +22,7 @@ defmodule Bench.Page do
   @type who :: :nobody | :readers | :deaf
 
   @doc "Measures so many rounds of turns, each of so many seconds."
-  @spec measure(%{atom() => pos_integer()}, (String.t() -> term())) ::
+  @spec measure(%{atom() => pos_integer() | atom()}, (String.t() -> term())) ::
           {:ok, %{who() => [turn()]}} | {:error, line :: String.t()}
   def measure(%{robots: robots} = given, note) do
     robots = Console.Fleet.of(robots)
@@ -41,11 +41,11 @@ defmodule Bench.Page do
 
   defp fleet(robots, vm, given, note) do
     with {:ok, fleet} <- Lab.Fleet.start_link(robots: robots, blobs: :direct),
-         {:ok, page, url} <- Page.start_link(module: Live.Fleet, live: fleet, robots: robots) do
+         {:ok, page, url} <- serve(given, module: Live.Fleet, live: fleet, robots: robots) do
       note.("the fleet forms")
       formed(fn -> Lab.Fleet.scene(fleet).formed? end, Hal.Clock.now_ms() + @form_ms)
       boards = Enum.map(robots, &Board.find!/1)
-      turns = turns(vm, url, given, note, &steady(boards, &1))
+      turns = turns(vm, url, robots, given, note, &steady(boards, &1))
       :ok = Supervisor.stop(page)
       :ok = Lab.Fleet.stop(fleet)
       {:ok, turns}
@@ -61,25 +61,47 @@ defmodule Bench.Page do
              Console.Options.trial(options),
              Console.Pace.new(:max)
            ),
-         {:ok, page, url} <- Page.start_link(module: Live.Trial, live: live, robots: robots) do
+         {:ok, page, url} <- serve(given, module: Live.Trial, live: live, robots: robots) do
       note.("the fleet forms in lockstep")
       formed(fn -> Live.Trial.scene(live).formed? end, Hal.Clock.now_ms() + @form_ms)
       {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
-      turns = turns(vm, url, given, note, &cost/1)
+      turns = turns(vm, url, robots, given, note, &cost/1)
       :ok = Supervisor.stop(page)
       :ok = Live.Trial.stop(live)
       {:ok, turns}
     end
   end
 
-  defp turns(vm, url, given, note, measure) do
+  defp serve(%{service: :page}, options), do: Page.start_link(options)
+
+  defp serve(%{service: name}, options) do
+    {_port, module} = Keyword.fetch!(Page.Service.all(), name)
+    Page.start_link([service: module] ++ options)
+  end
+
+  # What a client says at first, to hear all there is.
+  defp asked(%{service: :page}, _robots), do: []
+
+  defp asked(%{service: :foxglove}, robots) do
+    count = length(Bridge.Topics.list(robots))
+    asked = for id <- 1..count, do: %{id: id, channelId: id}
+    [%{op: "subscribe", subscriptions: asked}]
+  end
+
+  defp asked(%{service: :rosbridge}, robots) do
+    for %{key: {_topic, :none}, name: name} <- Bridge.Ros.list(robots),
+        do: %{op: "subscribe", topic: name}
+  end
+
+  defp turns(vm, url, robots, given, note, measure) do
     %URI{port: port} = URI.parse(url)
+    words = given |> asked(robots) |> Enum.map(&Hal.Json.encode!/1)
 
     turns =
       for round <- 1..given.rounds,
           {who, count} <- [nobody: 0, readers: given.clients, deaf: given.slow] do
         note.("round #{round} of #{given.rounds}, #{who}")
-        browsers = Vm.call(vm, Browsers, :start, [port, count, who], 70_000)
+        browsers = Vm.call(vm, Browsers, :start, [port, count, who, words], 70_000)
         wait(@begin_ms)
         turn = measure.(given.seconds * 1_000)
         :ok = Vm.call(vm, Browsers, :stop, [browsers])

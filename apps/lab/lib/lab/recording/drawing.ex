@@ -29,13 +29,8 @@ defmodule Lab.Recording.Drawing do
   @spec map(Floorplan.t()) :: iodata()
   def map(%Floorplan{} = map) do
     {width, height} = Floorplan.size(map)
-    block = div(max(map.width, map.height) - 1, @most_cells) + 1
-    columns = div(map.width - 1, block) + 1
-    rows = div(map.height - 1, block) + 1
-
-    walls = walls(map, block)
-
-    pixels = for row <- 0..(rows - 1), into: <<>>, do: pixels(walls[row], columns)
+    {columns, _rows, size} = cells(map)
+    pixels = ground(map, @wall, @floor)
 
     fields =
       for {name, offset} <- Enum.with_index(["red", "green", "blue", "alpha"]),
@@ -44,7 +39,7 @@ defmodule Lab.Recording.Drawing do
     Foxglove.grid(0, @frame, %{
       pose: {{-width / 2, -height / 2}, 0},
       columns: columns,
-      cell_size: {block * map.cell, block * map.cell},
+      cell_size: {size, size},
       row_stride: 4 * columns,
       cell_stride: 4,
       fields: fields,
@@ -52,12 +47,30 @@ defmodule Lab.Recording.Drawing do
     })
   end
 
-  defp pixels(nil, columns), do: :binary.copy(@floor, columns)
+  @doc "How a floor plan is drawn: its columns, its rows, and the size of a cell in metres."
+  @spec cells(Floorplan.t()) ::
+          {columns :: pos_integer(), rows :: pos_integer(), metres :: float()}
+  def cells(%Floorplan{} = map) do
+    block = block(map)
+    {div(map.width - 1, block) + 1, div(map.height - 1, block) + 1, block * map.cell}
+  end
 
-  defp pixels(walls, columns) do
+  defp block(map), do: div(max(map.width, map.height) - 1, @most_cells) + 1
+
+  @doc "The bytes of its cells, row after row from the corner of the least x and y, of one with a wall and one without."
+  @spec ground(Floorplan.t(), wall :: binary(), floor :: binary()) :: binary()
+  def ground(%Floorplan{} = map, wall, floor) do
+    {columns, rows, _size} = cells(map)
+    walls = walls(map, block(map))
+    for row <- 0..(rows - 1), into: <<>>, do: row(walls[row], columns, wall, floor)
+  end
+
+  defp row(nil, columns, _wall, floor), do: :binary.copy(floor, columns)
+
+  defp row(walls, columns, wall, floor) do
     for column <- 0..(columns - 1),
         into: <<>>,
-        do: if(is_map_key(walls, column), do: @wall, else: @floor)
+        do: if(is_map_key(walls, column), do: wall, else: floor)
   end
 
   # The larger cells that have a wall in them, by row and column: floor plans are mostly floor.

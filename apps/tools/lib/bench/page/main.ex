@@ -3,7 +3,7 @@ defmodule Bench.Page.Main do
   alias Bench.{Command, Load, Page}
   alias Hal.Cli.Parse
 
-  @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5}
+  @defaults %{robots: 30, clients: 20, slow: 100, seconds: 15, rounds: 5, service: :page}
 
   @doc "Runs the command; each error is one line."
   @spec run([String.t()]) :: :ok | {:error, [String.t()]}
@@ -33,7 +33,10 @@ defmodule Bench.Page.Main do
       {"clients", "N", &Parse.whole(&1, 1..200), "browsers that read (20)"},
       {"slow", "N", &Parse.whole(&1, 1..200), "browsers that read nothing (100)"},
       {"seconds", "S", &Parse.whole(&1, 1..600), "of each turn (15)"},
-      {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"}
+      {"rounds", "N", &Parse.whole(&1, 1..100), "how often each is measured (5)"},
+      {"service", "NAME",
+       &Parse.choice(&1, page: :page, foxglove: :foxglove, rosbridge: :rosbridge),
+       "what is served: page, foxglove, rosbridge, all of whose topics each\nclient asks for (page)"}
     ]
   end
 end
