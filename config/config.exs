@@ -21,8 +21,8 @@ config :swarm,
     teleop: Missions.Teleop
   ]
 
-# What records a robot whose file says `record:`.
-config :swarm, recorder: Record.Recorder
+# What records a robot whose file says `record:`, and keeps its last minute, if it says `incidents:`.
+config :swarm, recorder: Record.Recorder, incidents: Record.Incidents
 
 # What bin/demo and bin/console serve to other programs if they are asked to: option, port and module.
 config :console,

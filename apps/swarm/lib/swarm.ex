@@ -204,6 +204,18 @@ defmodule Swarm do
   def status(robot), do: StatusReport.one(robot)
 
   @doc """
+  Has robots write what they know of their last minute as a recording, on their own machines, for `mix replay`: what they were told and by
+  what they decided. Robots whose files have `incidents:` do it, too, at an emergency stop, a fault or a crash.
+
+      Swarm.keep(:mag1)
+      {:ok, "mag1: the last 60 s are kept in /var/lib/convoy/incidents"}
+
+  The answer says that it is being written; the robot's log says in which file, or why in none.
+  """
+  @spec keep(:all | [robot()] | robot()) :: {:ok, line :: String.t()} | answer()
+  def keep(robots \\ :all), do: tell(robots, :keep)
+
+  @doc """
   What a robot's sonars measured last, wherever it is: for each where it is on the body (its pose there), and how far the
   nearest thing is in metres. The error says why it is not known.
 

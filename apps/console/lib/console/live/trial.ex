@@ -215,8 +215,10 @@ defmodule Console.Live.Trial do
          do: tell(target, request, state)
   end
 
-  defp possible(command) when command in [:ping, :arm, :disarm, :acknowledge],
-    do: {:error, "in lockstep robots have no wheels to arm or disarm, and answer no ping"}
+  defp possible(command) when command in [:ping, :keep, :arm, :disarm, :acknowledge],
+    do:
+      {:error,
+       "in lockstep robots have no wheels to arm or disarm, answer no ping and keep nothing"}
 
   defp possible(_command), do: :ok
 

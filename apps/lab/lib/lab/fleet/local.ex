@@ -110,7 +110,7 @@ defmodule Lab.Fleet.Local do
 
   # Its recorder may be that of others, too.
   def suffer(backend, {:freeze, id, for_s}),
-    do: suspend(backend, id, List.delete(Names.roles(id), :recorder), for_s)
+    do: suspend(backend, id, Names.roles(id) -- [:recorder, :incidents], for_s)
 
   # They get no processor, as if the system had none for them. They go on when the process that holds them ends, with the fleet
   # at the latest.

@@ -11,6 +11,7 @@ defmodule Swarm.Comms.CommandHandler do
   |---|---|
   | `:status` | `Swarm.Status` |
   | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
+  | `:keep` | `{:ok, line}`: its last minute is written as a recording; or that it keeps none |
   | `:sonar` | `{:ok, [{where, metres}]}`: what its sonars measured last, or why that is not known |
   | `:layer` | `{:ok, layer}`: what its mission draws over the map (`t:Robot.Mission.layer/0`), or that it is too much |
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
@@ -67,6 +68,9 @@ defmodule Swarm.Comms.CommandHandler do
       :present ->
         [{:cast, :gate, {:present, div(now_us - asked_us, 1_000)}}, {:reply, ref, :ok}]
 
+      :keep ->
+        [{:cast, :incidents, {:keep, config.id, ref}}]
+
       {:drive, order} ->
         drive(order, config.id, ref, {asked_us, now_us})
 
@@ -80,13 +84,19 @@ defmodule Swarm.Comms.CommandHandler do
 
   # A robot in lockstep has no such words.
   defp judge(question, %{id: id}, %{} = board, _heard)
-       when question in [:status, :ping, :sonar, :layer] and not is_struct(board),
+       when question in [:status, :ping, :keep, :sonar, :layer] and not is_struct(board),
        do: {:error, "#{id} answers no #{question} in lockstep"}
 
   defp judge(:status, config, board, {receiver, _at_ms}), do: Status.of(config, board, receiver)
 
   defp judge(:ping, config, board, {receiver, _at_ms}),
     do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
+
+  defp judge(:keep, %{id: id}, _board, _heard) do
+    if Names.whereis(id, :incidents),
+      do: :keep,
+      else: {:error, "#{id} does not keep its last minute: its file has no incidents:"}
+  end
 
   defp judge(:sonar, config, board, {_receiver, at_ms}) do
     recent = fn key, _limit_ms -> Board.fetch(board, key, @recent_ms, at_ms) end

@@ -68,7 +68,7 @@ defmodule Swarm.Order.Freshness do
   def needed?({:estop, _call}), do: false
 
   def needed?(request),
-    do: request not in [:stop, :disarm, :estop, :status, :ping, :sonar, :layer]
+    do: request not in [:stop, :disarm, :estop, :status, :ping, :keep, :sonar, :layer]
 
   @doc "Whether a term from outside can be a stamp."
   @spec stamp?(term()) :: boolean()
