@@ -35,6 +35,7 @@ defmodule Docs.Checks do
     "bin/soak 46 1" => @long,
     "bin/demo --foxglove" => @live,
     "bin/demo --rmf" => @live,
+    "bin/demo --incidents incidents" => @live,
     "bin/console --rmf" => @live,
     "bin/console --foxglove" => @live,
     "bin/demo --rosbridge" => @live,

@@ -12,7 +12,7 @@ defmodule Console.Prompt do
   alias Robot.Command
   alias Swarm.{BehaviourRegistry, MissionRegistry}
 
-  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge pause resume step speed status nodes page tell help quit)
+  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -143,7 +143,7 @@ defmodule Console.Prompt do
       ["follow", _follower] -> names
       ["tell"] -> ["all" | names]
       ["speed"] -> ["0.1", "1", "10", "max"]
-      [word] when word in ["arm", "disarm", "acknowledge"] -> ["all" | names]
+      [word] when word in ["arm", "disarm", "acknowledge", "keep"] -> ["all" | names]
       ["start"] -> MissionRegistry.names() ++ names
       ["start", name] -> if name in names, do: MissionRegistry.names(), else: []
       ["run"] -> names
@@ -183,6 +183,7 @@ defmodule Console.Prompt do
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "run mag2 NAME                 one robot runs a behaviour of your own",
         "estop, or F8; reset           emergency stop of all, until the reset",
+        "keep, keep mag2               their last minute is written as a recording",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
       ] ++
       when_offered.(:arm, [
@@ -292,6 +293,8 @@ defmodule Console.Prompt do
   defp command(word, _rest, _robots) when word in ["arm", "disarm", "acknowledge"],
     do: {:error, "#{word} needs one name, or all: #{word} mag1, #{word} all"}
 
+  defp command("keep", [], robots), do: tell("all", ["keep"], robots)
+  defp command("keep", [name], robots), do: tell(name, ["keep"], robots)
   defp command("reset", [], _robots), do: {:ok, :reset}
 
   defp command(word, [], _robots) when word in ["pause", "resume"],

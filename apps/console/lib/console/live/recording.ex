@@ -6,11 +6,36 @@ defmodule Console.Live.Recording do
   alias Console.Options
   alias Lab.Trial.Setup
 
+  @trace {Record.Recorder, :trace, []}
+  @incidents_mb 100
+
+  @doc "Says that so many robots are no processes, and keep nothing; the exit status."
+  @spec refused_incidents(Options.t()) :: 1
+  def refused_incidents(options),
+    do:
+      say(
+        "--incidents: #{length(options.robots)} robots run in lockstep on this machine, where --record records all"
+      )
+
   @doc """
   Runs `play` with the options, whose robots hand on what they are told and do if it is to be
   recorded; returns its exit status, or 1 with a line if the file is not whole.
   """
   @spec run(Options.t(), (Options.t() -> 0 | 1 | 2)) :: 0 | 1 | 2
+  def run(%Options{incidents: folder} = options, play) when folder != nil do
+    {:ok, _apps} = Application.ensure_all_started(:swarm)
+    kept = [robots: options.robots, folder: folder, limit_mb: @incidents_mb]
+    {:ok, incidents} = Record.Incidents.start_link(kept)
+    # What becomes of it does not concern the demo.
+    Process.unlink(incidents)
+
+    try do
+      run(%{options | incidents: nil, trace: @trace}, play)
+    after
+      Process.exit(incidents, :shutdown)
+    end
+  end
+
   def run(%Options{record: nil} = options, play), do: play.(options)
 
   def run(%Options{record: path} = options, play) do
@@ -24,7 +49,7 @@ defmodule Console.Live.Recording do
       try do
         case opened(recorder) do
           :ok ->
-            status = play.(%{options | record: nil, trace: {Record.Recorder, :trace, []}})
+            status = play.(%{options | record: nil, trace: @trace})
             recorder |> finished() |> told(options, status)
 
           {:error, line} ->

@@ -104,14 +104,18 @@ defmodule Mix.Tasks.Demo do
   end
 
   defp live(options) do
-    if Options.real_time?(options) or (options.speed == nil and few?(options.robots)),
-      do:
-        recorded(
-          options,
-          &Session.run(&1, Live.Fleet, fn trial -> Live.Fleet.start_link(trial) end)
-        ),
-      else: lockstep(options, Console.Pace.new(options.speed || 1.0))
+    cond do
+      processes?(options) -> recorded(options, &live_fleet/1)
+      options.incidents != nil -> Live.Recording.refused_incidents(options)
+      true -> lockstep(options, Console.Pace.new(options.speed || 1.0))
+    end
   end
+
+  defp live_fleet(options),
+    do: Session.run(options, Live.Fleet, fn trial -> Live.Fleet.start_link(trial) end)
+
+  defp processes?(options),
+    do: Options.real_time?(options) or (options.speed == nil and few?(options.robots))
 
   defp few?(robots), do: length(robots) <= @robots_a_processor * System.schedulers_online()
 end
