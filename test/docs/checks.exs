@@ -7,7 +7,6 @@ defmodule Docs.Checks do
   alias Docs.{LookedAt, Reader, Sandbox}
 
   @example "test/example_test.exs builds and runs it"
-  @python "it needs a package of Python; apps/bridge tries it where that is"
   @live "it goes on until somebody ends it"
   @tests "it is the tests"
   @long "it takes longer than 10 s"
@@ -40,11 +39,6 @@ defmodule Docs.Checks do
     "bin/console --foxglove" => @live,
     "bin/demo --rosbridge" => @live,
     "bin/console --rosbridge" => @live,
-    "pip install roslibpy" => @python,
-    "python3 examples/python/watch.py" => @python,
-    "python3 examples/python/order.py formation wedge 1.5" => @python,
-    "python3 examples/python/drive.py mag1 0.3 0" => @python,
-    "python3 examples/python/controller.py mag1" => @python,
     "bin/demo --nodes" => @live,
     "bin/demo --nodes --robots 4" => @live,
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
@@ -145,6 +139,8 @@ defmodule Docs.Checks do
     "config :swarm, mesh: [multicast",
     "config :swarm, mesh: [topologies",
     "-pa _build/dev/lib/hal/ebin _build/dev/lib/mesh/ebin",
+    # Programs in Python; apps/bridge tries them where roslibpy is.
+    "pip install roslibpy",
     # What programs print that are not run here.
     "Active: active (running)",
     "27.6 s  wheels 0.20 m/s",

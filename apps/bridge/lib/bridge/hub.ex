@@ -68,7 +68,7 @@ defmodule Bridge.Hub do
 
     {:ok,
      Map.merge(s, %{
-       known: [],
+       known: nil,
        channels: [],
        told: nil,
        paths: %{},

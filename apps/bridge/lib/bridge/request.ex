@@ -83,6 +83,8 @@ defmodule Bridge.Request do
     end
   end
 
+  defp robot(_request, []), do: {:error, "there are no robots here"}
+
   defp robot(%{"robot" => name}, robots) do
     if Enum.any?(robots, &(Atom.to_string(&1) == name)),
       do: {:ok, name},

@@ -88,6 +88,21 @@ defmodule Bridge.FoxgloveTest do
              got
   end
 
+  test "greets a viewer before there are robots" do
+    {:ok, live} = FakeLive.start_link(FakeLive.of([], map: nil))
+
+    {:ok, _page, url} =
+      Page.start_link(module: FakeLive, live: live, robots: [], service: Foxglove)
+
+    {client, advertised, services} = viewer(url)
+
+    assert for(%{"topic" => topic} <- advertised["channels"], do: topic) ==
+             ~w(/log /map /paths /scene /tf /mission)
+
+    assert {{false, "there are no robots here"}, _client} =
+             call(client, services, "/goto", 1, ~S({"robot":"mag1","x":1,"y":2}))
+  end
+
   # What a client is told of the subscription, as decoded JSON.
   defp message(client, id) do
     await(client, fn
