@@ -267,10 +267,15 @@ defmodule Console.Report do
     end
   end
 
+  defp leadership(%{leaders_at_once_max: 0} = result), do: messages(result)
+
   defp leadership(result) do
     changes = result.leader_changes |> Format.count("change") |> String.capitalize()
 
-    "#{changes} of leader, at most #{result.leaders_at_once_max} at once; " <>
-      "#{Format.count(result.messages.sent, "message")}, #{result.messages.lost} lost."
+    "#{changes} of leader, never more than #{result.leaders_at_once_max} at once; " <>
+      messages(result)
   end
+
+  defp messages(result),
+    do: "#{Format.count(result.messages.sent, "message")}, #{result.messages.lost} lost."
 end

@@ -10,7 +10,9 @@ defmodule Console.Terminal do
   alias Console.Terminal.{Canvas, Editor, Style, Table}
   alias Sim.Scene
 
-  @try "Try:  kill leader  ·  formation wedge 1.2  ·  landmark 3,2  ·  help  ·  quit"
+  # What is worth a try in the landmark mission, and in others.
+  @try ["kill leader", "formation wedge 1.2", "landmark 3,2", "help", "quit"]
+  @try_others ["status", "stop", "start", "help", "quit"]
 
   defstruct columns: 80,
             rows: 24,
@@ -49,9 +51,15 @@ defmodule Console.Terminal do
   @spec leave() :: String.t()
   def leave, do: "\e[0m\e[?7h\e[?25h\e[?1049l"
 
-  @doc "Three things to try."
-  @spec hint() :: String.t()
-  def hint, do: @try
+  @doc """
+  Three things to try, with this mission.
+
+      iex> Console.Terminal.hint("patrol")
+      "Try:  status  ·  stop  ·  start  ·  help  ·  quit"
+  """
+  @spec hint(mission :: String.t() | nil) :: String.t()
+  def hint(mission) when mission in [nil, "landmark"], do: "Try:  " <> Enum.join(@try, "  ·  ")
+  def hint(_other), do: "Try:  " <> Enum.join(@try_others, "  ·  ")
 
   @doc "Shows lines in place of the map."
   @spec show(t(), [String.t()]) :: t()
@@ -88,7 +96,8 @@ defmodule Console.Terminal do
     rows =
       [header(scene, view.columns, view.pace)] ++
         body ++
-        happened(scene, happened) ++ answers(view, answers) ++ [[{@try, :dim}], prompt(view)]
+        happened(scene, happened) ++
+        answers(view, answers) ++ [[{hint(scene.mission), :dim}], prompt(view)]
 
     {Enum.take(rows, -view.rows), view}
   end

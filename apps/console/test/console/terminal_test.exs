@@ -6,6 +6,7 @@ defmodule Console.TerminalTest do
   doctest Console
   doctest Console.Prompt
   doctest Console.Cli.Progress
+  doctest Console.Terminal
   doctest Console.Terminal.Canvas
   doctest Console.Terminal.Editor
   doctest Console.Terminal.Style

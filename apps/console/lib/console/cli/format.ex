@@ -179,11 +179,20 @@ defmodule Console.Cli.Format do
   @doc "The fleet at this moment in one line."
   @spec status(Sim.Scene.t()) :: String.t()
   def status(scene) do
-    living = Enum.count(scene.robots, & &1.alive)
-    sight = Enum.count(scene.robots, &(&1.alive and &1.size_ppm != nil))
-
-    doing = "#{count(living, "robot")}, #{sight} with the landmark in sight, #{leader(scene)}"
+    living = Enum.filter(scene.robots, & &1.alive)
+    doing = "#{count(length(living), "robot")}, #{doing(scene, living)}"
     String.pad_leading(decimals(scene.at_ms / 1000, 1), 7) <> " s  #{estop(scene) || doing}"
+  end
+
+  defp doing(%{mission: mission} = scene, living) when mission in [nil, "landmark"] do
+    sight = Enum.count(living, &(&1.size_ppm != nil))
+    "#{sight} with the landmark in sight, #{leader(scene)}"
+  end
+
+  # Of other missions the phases that their robots are in.
+  defp doing(%{mission: mission}, living) do
+    phases = living |> Enum.frequencies_by(& &1.state) |> Enum.sort()
+    "#{mission}: #{Enum.map_join(phases, ", ", fn {phase, count} -> "#{count} #{phase}" end)}"
   end
 
   @doc "All robots, each in a line of its own."

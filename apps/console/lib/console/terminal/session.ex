@@ -145,7 +145,7 @@ defmodule Console.Terminal.Session do
 
   defp begin(session, options, lines) do
     Enum.each([Demo.heading(options, session.scene) | lines], &Output.line(session.output, &1))
-    Output.line(session.output, Terminal.hint())
+    Output.line(session.output, Terminal.hint(session.scene.mission))
   end
 
   # Reading waits, so it has a process of its own.

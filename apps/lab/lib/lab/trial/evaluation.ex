@@ -100,7 +100,7 @@ defmodule Lab.Trial.Evaluation do
       leader: leader,
       leaders_at_once_max: run.run_log.leaders_at_once_max,
       leader_changes: max(run.run_log.elections - 1, 0),
-      mission: mission(run.options),
+      mission: mission(run.options) || scene.mission,
       formation: %{
         kind: kind,
         spacing_m: spacing,
@@ -121,7 +121,7 @@ defmodule Lab.Trial.Evaluation do
     }
   end
 
-  # The one that was asked for by its name, if any.
+  # The one that was asked for by its name; of robots that a person has given another one, what most of them are on.
   defp mission(%{mission: {module, _options}}), do: Swarm.MissionRegistry.name(module)
   defp mission(_default), do: nil
 
