@@ -38,7 +38,7 @@ defmodule Console.Report do
       messages: object(result.messages, @messages),
       fleet: Enum.map(result.fleet, &object(&1, @robot))
     })
-    |> object(if(result.mission, do: [:mission | @keys], else: @keys))
+    |> object(if(result.mission in [nil, "landmark"], do: @keys, else: [:mission | @keys]))
   end
 
   @doc "The report as JSON: one line with a newline at its end."
