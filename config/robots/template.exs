@@ -129,6 +129,9 @@
   # oldest are deleted before they exceed limit_mb, 4 or more. An hour on a mission takes about 40 MB. nil for none.
   # record: [folder: "/var/lib/convoy/runs", limit_mb: 500, pictures: 1],
 
+  # Keeps its last minute in memory, and writes it after an emergency stop, a fault or a crash.
+  # incidents: [folder: "/var/lib/convoy/incidents", limit_mb: 100, seconds: 60],
+
   # For `robot halt`, the last thing that this machine does: the controller reads the phrase on the machine's
   # serial console and cuts the power. Without it, or nil, there is no such command.
   # console: [port: "/dev/ttyS0", speed: 9600, phrase: "The system is halted"],

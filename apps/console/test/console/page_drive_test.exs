@@ -172,10 +172,10 @@ defmodule Console.PageDriveTest do
        } do
     answers = fn ->
       Browser.run(browser, """
-      window.said ??= [];
-      window.watch ??= new MutationObserver(() => window.said.push(document.getElementById('answer').textContent));
+      window.heard ??= [];
+      window.watch ??= new MutationObserver(() => window.heard.push(document.getElementById('answer').textContent));
       window.watch.observe(document.getElementById('answer'), { childList: true });
-      return window.said;
+      return window.heard;
       """)
     end
 
@@ -232,14 +232,14 @@ defmodule Console.PageDriveTest do
   test "a tap with two fingers gives no order, in whatever order they come and go; one with a finger does",
        %{browser: browser, id: id, live: live} do
     Browser.run(browser, """
-    window.said = [];
+    window.heard = [];
     const send = WebSocket.prototype.send;
-    WebSocket.prototype.send = function (line) { window.said.push(line); return send.call(this, line); };
+    WebSocket.prototype.send = function (line) { window.heard.push(line); return send.call(this, line); };
     """)
 
     # That a person sees the page is no order.
     said = fn ->
-      Browser.run(browser, "return window.said.filter((line) => !line.endsWith(' present'))")
+      Browser.run(browser, "return window.heard.filter((line) => !line.endsWith(' present'))")
     end
 
     [left, right] = [{1, 200, 300}, {2, 260, 320}]
