@@ -125,6 +125,7 @@ defmodule Console.About do
       cone: :math.pi() / 12,
       seen: nil,
       camera: false,
+      keeps: false,
       pictures: nil,
       looks: nil,
       sees: nil,
@@ -145,6 +146,7 @@ defmodule Console.About do
       power: status.power,
       offline: for({device, {:offline, _reason}} <- status.health, do: device),
       estop: status.estop,
+      keeps: status.keeps,
       looks: Sight.words(status.head),
       sees: Sight.words(status.sees),
       notes: notes(status)

@@ -37,7 +37,7 @@ export function nothing(floor) {
   floor.about = null;
   by("about").replaceChildren();
   by("reasons").hidden = true;
-  by("camera").hidden = by("sonar").hidden = true;
+  by("camera").hidden = by("sonar").hidden = act("keep").hidden = true;
 }
 
 export function one(scene, chosen, floor) {
@@ -111,6 +111,7 @@ export function about(told) {
   by("camera").disabled = !told.camera;
   by("camera").title = told.pictures ? `pictures ${told.pictures}` : "";
   by("sonar").hidden = told.sonar.length === 0;
+  act("keep").hidden = !told.keeps;
 }
 
 // At most five pictures a second, and only while somebody looks; each is asked for when the one before is there. One that does

@@ -51,7 +51,8 @@ defmodule Swarm.Status do
   After the age stands where its camera looks (`head`), and what that shows of the landmark (`sees`; `Swarm.Status.Sight`), of
   robots that have a pan-tilt unit and a camera: `looks at 12, 0 deg (zoom 49 deg), sees YellowLandmark at -12 deg, 2.31 m`.
 
-  `meters` are its counts since its board began (`Robot.Meters`); the line does not have them.
+  `meters` are its counts since its board began (`Robot.Meters`), `keeps` says whether its last minute can be written
+  (`Swarm.keep/1`); the line does not have them.
 
   A robot whose machine has no network says `NO NETWORK`, and why (`network`; `Mesh.fault/0`).
 
@@ -107,6 +108,7 @@ defmodule Swarm.Status do
     hears: {[], nil},
     network: {nil, nil},
     meters: {nil, nil},
+    keeps: {false, nil},
     rejected: {%{}, :sum},
     age_ms: {nil, :age},
     head: {nil, {:maybe, :head}},
@@ -162,6 +164,7 @@ defmodule Swarm.Status do
           rejected: %{atom() => pos_integer()},
           network: String.t() | nil,
           meters: Robot.Meters.counts() | nil,
+          keeps: boolean(),
           head: Sight.head(),
           sees: Sight.t(),
           age_ms: non_neg_integer() | nil
@@ -206,6 +209,11 @@ defmodule Swarm.Status do
   defp read(:network, _seen), do: Mesh.fault()
   defp read(:meters, %{board: %Board{meters: meters}}), do: Robot.Meters.read(meters)
   defp read(:meters, _in_lockstep), do: nil
+
+  defp read(:keeps, %{board: %Board{robot: id}}),
+    do: Robot.Names.whereis(id, :incidents) != nil
+
+  defp read(:keeps, _in_lockstep), do: false
   defp read(:state, %{entries: entries}), do: entries |> value(:mission) |> state()
 
   defp read(:mission, %{entries: entries}) do
