@@ -21,12 +21,16 @@ config :swarm,
     teleop: Missions.Teleop
   ]
 
-# What records a robot whose file says `record:`.
-config :swarm, recorder: Record.Recorder
+# What records a robot whose file says `record:`, and keeps its last minute, if it says `incidents:`.
+config :swarm, recorder: Record.Recorder, incidents: Record.Incidents
 
 # What bin/demo and bin/console serve to other programs if they are asked to: option, port and module.
 config :console,
-  services: [foxglove: {8765, Bridge.Foxglove}, rosbridge: {9090, Bridge.Rosbridge}]
+  services: [
+    foxglove: {8765, Bridge.Foxglove},
+    rosbridge: {9090, Bridge.Rosbridge},
+    rmf: {22_011, Bridge.Rmf}
+  ]
 
 # What a build adds of its own (docs/extending.md).
 if File.exists?(Path.join(__DIR__, "extensions.exs")), do: import_config("extensions.exs")

@@ -236,9 +236,9 @@ defmodule System.DocsTest do
              []
   end
 
-  describe "the tables of the user guide" do
-    defp rows(title) do
-      guide = File.read!(Path.join(@root, "docs/user-guide.md"))
+  describe "the tables of user guide and reference" do
+    defp rows(title, document \\ "user-guide.md") do
+      guide = File.read!(Path.join([@root, "docs", document]))
       [_before, section] = String.split(guide, "\n#{title}\n", parts: 2)
       [section | _rest] = String.split(section, ~r/\n##+ /)
 
@@ -249,7 +249,7 @@ defmodule System.DocsTest do
     defp codes(cell), do: for([_all, code] <- Regex.scan(~r/`([^`]+)`/, cell), do: code)
 
     test "all text commands are there, as the robots take them" do
-      forms = Enum.flat_map(rows("### Text commands"), &codes/1)
+      forms = Enum.flat_map(rows("## Text commands", "reference.md"), &codes/1)
       words = Enum.map(forms, &hd(String.split(&1, ":")))
       assert Enum.sort(Enum.uniq(words)) == Enum.sort(Robot.Command.keywords())
 
@@ -258,6 +258,27 @@ defmodule System.DocsTest do
         text = String.replace(text, ~r/\b[A-Z]+\b(?<!Red)/, "1")
         assert {:ok, _command} = Robot.Command.parse(text, [:mag1]), form
       end
+    end
+
+    test "all behaviours of Robot.Behaviour are there" do
+      told =
+        for cell <- rows("## Behaviours that can be goals", "reference.md"), do: hd(codes(cell))
+
+      known =
+        for module <- Application.spec(:robot, :modules),
+            String.starts_with?(inspect(module), "Robot.Behaviour."),
+            {:module, _} = Code.ensure_loaded(module),
+            [Robot.Behaviour] in Keyword.get_values(module.__info__(:attributes), :behaviour),
+            do: inspect(module)
+
+      assert Enum.sort(told) == Enum.sort(known)
+    end
+
+    test "all events are there, as Hal.Event has them" do
+      {:docs_v1, _, _, _, %{"en" => told}, _, _} = Code.fetch_docs(Hal.Event)
+      table = for line <- String.split(told, "\n"), String.starts_with?(line, "|"), do: line
+      reference = File.read!(Path.join(@root, "docs/reference.md"))
+      assert reference =~ Enum.join(table, "\n")
     end
 
     test "the commands of the prompt are there, and taken" do

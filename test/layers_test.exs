@@ -1,33 +1,8 @@
 defmodule System.LayersTest do
   @moduledoc "Inside an app, rooms name only those that docs/modules.md has before them; names mean one thing."
   use ExUnit.Case, async: true
+  alias Tools.Api.Rooms
   @root Path.expand("..", __DIR__)
-
-  # `| hal | a, b, c |` of the table, rooms by the names of their folders or files.
-  defp layers do
-    [_before, section] =
-      @root
-      |> Path.join("docs/modules.md")
-      |> File.read!()
-      |> String.split("## Rooms", parts: 2)
-
-    [section | _after] = String.split(section, "\n## ", parts: 2)
-
-    for [_row, app, rooms] <- Regex.scan(~r/^\| `(\w+)` \| (.*) \|$/m, section),
-        do: {app, for([_all, room] <- Regex.scan(~r/`(\w+)`/, rooms), do: room)}
-  end
-
-  defp room(app, module) do
-    source = to_string(module.module_info(:compile)[:source])
-
-    with [_all, rest] <- Regex.run(~r"/apps/#{app}/lib/(.+)\.ex$", source),
-         do: rest |> String.split("/") |> room_of(app)
-  end
-
-  # A room may have modules of its own name, such as `Mcap`, in a folder beside the app's. Its tasks for Mix are in none.
-  defp room_of([app, room | _], app), do: room
-  defp room_of([room | _], app) when room not in [app, "mix"], do: room
-  defp room_of(_others, _app), do: nil
 
   # Calls at run time.
   defp calls(module) do
@@ -76,14 +51,21 @@ defmodule System.LayersTest do
     do: Map.get(aliases, first, [first]) ++ rest
 
   test "each room names those before it" do
-    layers = layers()
+    layers = @root |> Path.join("docs/modules.md") |> File.read!() |> Rooms.table()
     assert length(layers) >= 5
 
     wrong =
       for {app, rooms} <- layers do
-        {:ok, modules} = :application.get_key(String.to_existing_atom(app), :modules)
+        {:ok, modules} = :application.get_key(app, :modules)
         place = rooms |> Enum.with_index() |> Map.new()
-        homes = for module <- modules, home = room(app, module), into: %{}, do: {module, home}
+
+        homes =
+          for module <- modules,
+              home = Rooms.room(app, module),
+              home not in ["", "mix"],
+              into: %{},
+              do: {module, home}
+
         assert {app, Enum.sort(Enum.uniq(Map.values(homes))) -- rooms} == {app, []}
 
         for {module, home} <- homes,

@@ -204,6 +204,18 @@ defmodule Swarm do
   def status(robot), do: StatusReport.one(robot)
 
   @doc """
+  Has robots write what they know of their last minute as a recording, on their own machines, for `mix replay`: what they were told and by
+  what they decided. Robots whose files have `incidents:` do it, too, at an emergency stop, a fault or a crash.
+
+      Swarm.keep(:mag1)
+      {:ok, "mag1: the last 60 s are kept in /var/lib/convoy/incidents"}
+
+  The answer says that it is being written; the robot's log says in which file, or why in none.
+  """
+  @spec keep(:all | [robot()] | robot()) :: {:ok, line :: String.t()} | answer()
+  def keep(robots \\ :all), do: tell(robots, :keep)
+
+  @doc """
   What a robot's sonars measured last, wherever it is: for each where it is on the body (its pose there), and how far the
   nearest thing is in metres. The error says why it is not known.
 
@@ -213,6 +225,18 @@ defmodule Swarm do
   def sonar(robot) do
     with {:ok, [id]} <- Commands.robots([robot]),
          do: ask(id, :sonar) || {:error, "#{id} does not answer"}
+  end
+
+  @doc """
+  What a robot's mission draws over the map (`t:Robot.Mission.layer/0`), wherever it is; `[]` of one that draws nothing. The error says
+  why it is not known, such as that it is more than is sent at once.
+
+      Swarm.layer(:mag1)
+  """
+  @spec layer(robot()) :: {:ok, Robot.Mission.layer()} | {:error, line :: String.t()}
+  def layer(robot) do
+    with {:ok, [id]} <- Commands.robots([robot]),
+         do: ask(id, :layer) || {:error, "#{id} does not answer"}
   end
 
   @doc "Which robot hears which, as a table in `iex`."

@@ -12,6 +12,7 @@ defmodule SwarmPureTest do
   doctest Swarm.Agreement.Round.Precedence
   doctest Swarm.Wire.CounterGuard
   doctest Swarm.Message
+  doctest Swarm.Message.Words
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Order
 end

@@ -33,6 +33,9 @@ defmodule Bridge.Foxglove do
         }
 
   @impl Console.Page.Service
+  def scheme, do: "ws"
+
+  @impl Console.Page.Service
   def feed(source), do: {Hub, Map.put(source, :catalogue, Bridge.Topics)}
 
   @impl Console.Page.Service

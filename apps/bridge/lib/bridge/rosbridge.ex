@@ -26,6 +26,9 @@ defmodule Bridge.Rosbridge do
         }
 
   @impl Console.Page.Service
+  def scheme, do: "ws"
+
+  @impl Console.Page.Service
   def feed(source), do: {Hub, Map.put(source, :catalogue, Bridge.Ros)}
 
   @impl Console.Page.Service

@@ -99,6 +99,11 @@ defmodule Console.About do
     })
   end
 
+  @doc "The same with what its mission draws, as it was asked for (`Swarm.layer/1`), or with why that is not known."
+  @spec with_layer(t(), {:ok, Robot.Mission.layer()} | {:error, line :: String.t()}) :: t()
+  def with_layer(about, {:ok, layer}), do: %{about | layer: layer(layer)}
+  def with_layer(about, {:error, line}), do: %{about | notes: about.notes ++ [line]}
+
   @doc "The same where nothing is known but what is put into it."
   @spec nothing() :: t()
   def nothing do

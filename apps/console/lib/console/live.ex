@@ -55,8 +55,17 @@ defmodule Console.Live do
   @doc "Status lines of all its robots, or of one."
   @callback status(live :: term(), :all | atom()) :: [String.t()]
 
+  @doc "The status of each robot that is heard, by its own word; fleets that are not of processes have none."
+  @callback statuses(live :: term()) :: [Swarm.Status.t()]
+
   @doc "What one robot knows and does, as the page shows it (`Console.About`); `nil` if that is not known here."
   @callback about(live :: term(), atom()) :: map() | nil
+
+  @doc """
+  What robots have said to each other of late (`Lab.Messages`), up to the time that is shown; the error says in one line why that is
+  not known here.
+  """
+  @callback messages(live :: term()) :: {:ok, [Lab.Messages.entry()]} | {:error, String.t()}
 
   # A recording has these, too.
 
@@ -96,6 +105,8 @@ defmodule Console.Live do
                       notice: 1,
                       status: 2,
                       about: 2,
+                      statuses: 1,
+                      messages: 1,
                       answer: 2,
                       history: 2,
                       beside: 1

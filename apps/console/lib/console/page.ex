@@ -58,8 +58,11 @@ defmodule Console.Page do
 
   # A browser on this machine need not know its address.
   defp url(service, {0, 0, 0, 0}, port), do: url(service, {127, 0, 0, 1}, port)
-  defp url(nil, address, port), do: "http://#{:inet.ntoa(address)}:#{port}/"
-  defp url(_service, address, port), do: "ws://#{:inet.ntoa(address)}:#{port}/"
+
+  defp url(service, address, port) do
+    scheme = if service, do: service.scheme(), else: "http"
+    "#{scheme}://#{:inet.ntoa(address)}:#{port}/"
+  end
 
   defp server do
     case Application.ensure_all_started(:mochiweb) do

@@ -85,9 +85,10 @@ export function ordered(...ids) {
   return edited;
 }
 
+// What is not known is shown as such.
 function follow(id, value) {
   const control = by(id);
-  if (value === null || value === undefined || control.classList.contains("edited") || control.value === value) return;
+  if (control.classList.contains("edited") || control.value === value) return;
   if (control.tagName === "SELECT" && ![...control.options].some((option) => option.value === value)) control.add(new Option(value));
   control.value = value;
 }
@@ -95,17 +96,15 @@ function follow(id, value) {
 // What is in force, and what cannot be ordered now. Stops always can.
 export function controls(scene) {
   const alive = scene.robots.filter((r) => r.alive);
-  follow("mission", scene.mission);
-  if (scene.formation) {
-    follow("shape", scene.formation[0]);
-    follow("spacing", scene.formation[1].toFixed(1));
-  }
-  follow("speed", scene.speed);
+  follow("mission", scene.mission ?? "");
+  follow("shape", scene.formation?.[0] ?? "");
+  follow("spacing", scene.formation?.[1].toFixed(1) ?? "");
+  if (scene.speed) follow("speed", scene.speed);
   const none = alive.length === 0 && "no robot is alive";
   const bars = alive.map((r) => r.bars);
   const still = alive.length > 0 && bars.every(Boolean) && (new Set(bars).size === 1 ? `no robot can move: ${bars[0]}` : "no robot can move: the list says why");
   bar(by("start"), none || still);
-  bar(by("form"), none || still);
+  bar(by("form"), none || still || (by("shape").value === "" && "choose a shape first"));
   bar(document.querySelector("[data-line='kill leader']"), !scene.leader && "there is no leader to kill yet");
   by("pace").hidden = scene.pace === null;
   bar(document.querySelector("[data-line=pause]"), scene.paused && "it is paused already");

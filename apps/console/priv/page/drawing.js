@@ -16,7 +16,7 @@ export function paint(floor, colour) {
   if (scene) {
     const placed = floor.here().map((r) => [r, colour(scene.robots.indexOf(r))]);
     if (floor.trails) for (const [r, hue] of placed) trail(c, floor, r, hue);
-    for (const sign of floor.about?.layer.length ? floor.about.layer : scene.layer) layer(c, view, sign);
+    for (const sign of floor.layer()) layer(c, view, sign);
     for (const [r, hue] of placed) doubt(c, view, r, hue);
     for (const [r, hue] of placed) slot(c, view, r, hue);
     for (const [r, hue] of placed) leash(c, floor, r, hue);
@@ -108,13 +108,27 @@ function layer(c, view, { kind, points, size }) {
   const places = points.map(([x, y]) => view.toPixel(x, y));
   c.lineWidth = 1.5;
   if (kind === "polyline") return dashed(c, ink("--dim"), () => places.forEach((place) => c.lineTo(...place)));
-  for (const [k, [x, y]] of places.entries()) {
-    c.strokeStyle = ink("--dim");
+  c.strokeStyle = ink("--dim");
+  for (const [x, y] of places) {
     c.beginPath();
     c.arc(x, y, 5, 0, 7);
     c.stroke();
-    text(c, points[k][2], x, y + 19);
   }
+  // A label for which there is no room is left out.
+  const taken = [];
+  for (const [k, [x, y]] of places.entries()) {
+    const at = room(c, taken, points[k][2], x, [y + 19, y - 10, y + 33, y - 24]);
+    if (at !== undefined) text(c, points[k][2], x, at);
+  }
+}
+
+// The first of these heights at which there are no other words yet; it is taken then.
+function room(c, taken, words, x, heights) {
+  c.font = FONT;
+  const half = c.measureText(words).width / 2 + 3;
+  const at = heights.find((y) => !taken.some((t) => Math.abs(t.x - x) < t.half + half && Math.abs(t.at - y) < 13));
+  if (at !== undefined) taken.push({ x, at, half });
+  return at;
 }
 
 function cells(c, view, places, size) {
@@ -298,15 +312,8 @@ function outline(c, r, x, y, radius) {
 
 // Names above the robots, and below the landmark; on the other side where there is a name already.
 function labels(c, view, robots, mark) {
-  c.font = FONT;
   const taken = [];
-  const place = (words, [x, y], above, below) => {
-    const half = c.measureText(words).width / 2;
-    const free = (at) => !taken.some((t) => Math.abs(t.x - x) < t.half + half && Math.abs(t.at - at) < 13);
-    const at = free(y + above) ? y + above : y + below;
-    taken.push({ x, at, half });
-    text(c, words, x, at);
-  };
+  const place = (words, [x, y], above, below) => text(c, words, x, room(c, taken, words, x, [y + above, y + below]) ?? y + below);
   if (mark) place("landmark", view.toPixel(...mark), 22, -16);
   for (const r of robots) {
     const words = [r.id + (r.leader ? " ★" : ""), r.badges[0]?.word].filter(Boolean).join(" · ");

@@ -4,6 +4,7 @@ import { modified } from "./keys.js";
 const NEAR = 14; // pixels round what is pointed at
 const FINGER = 24; // a finger is broader
 const STILL = 4; // a click may move so far
+const HOLD_MS = 500; // a finger that stays sends the chosen robot to its place, also where a tap would choose another
 
 export class Gestures {
   constructor(floor) {
@@ -21,6 +22,8 @@ export class Gestures {
     addEventListener("blur", () => (this.fingers.clear(), (this.pinch = null), this.abandon()));
     // A second finger may be beside the map.
     addEventListener("pointerdown", (e) => this.dragged && this.dragged.id !== e.pointerId && this.abandon(), true);
+    // The browser's own answer to a finger that stays.
+    canvas.addEventListener("contextmenu", (e) => e.pointerType === "touch" && e.preventDefault());
     canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     canvas.addEventListener("keydown", (e) => this.key(e));
     for (const name of ["focus", "blur"]) canvas.addEventListener(name, () => floor.draw());
@@ -45,7 +48,7 @@ export class Gestures {
     return { robot: floor.here().find((r) => near(floor.toPixel(r.x, r.y), Math.max(reach, r.r * floor.view.at.scale))) };
   }
 
-  // Only one pointer, and its main button, gives orders: a right click opens a menu, two fingers zoom.
+  // Only one pointer, and its main button, gives orders: a right click opens a menu, two fingers zoom, a long press sends.
   down(e) {
     const { floor } = this;
     if (!floor.fit()) return;
@@ -56,6 +59,14 @@ export class Gestures {
     floor.canvas.setPointerCapture(e.pointerId);
     this.dragged = { id: e.pointerId, from: this.pixel(e), place: this.toFloor(e), robot, landmark, moved: false };
     floor.moving = landmark ? this.toFloor(e) : null;
+    if (e.pointerType === "touch" && !landmark) this.hold = setTimeout(() => this.held(), HOLD_MS);
+  }
+
+  held() {
+    const { place, moved } = this.dragged;
+    if (moved) return;
+    this.abandon();
+    this.floor.on.send(...place);
   }
 
   move(e) {
@@ -96,6 +107,7 @@ export class Gestures {
   }
 
   abandon() {
+    clearTimeout(this.hold);
     this.dragged = this.floor.moving = null;
     this.floor.canvas.className = "";
     this.floor.draw();

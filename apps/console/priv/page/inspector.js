@@ -2,8 +2,11 @@
 import { all, by, made, words, write } from "./dom.js";
 import { bar } from "./controls.js";
 
-// Tabs as in W3C's patterns: one of them is in the order of Tab, the arrows go through them.
-export function tabs() {
+let opened = () => {};
+
+// Tabs as in W3C's patterns: one of them is in the order of Tab, the arrows go through them. `tell` is called with one that opens.
+export function tabs(tell) {
+  opened = tell;
   const tabs = all("[role=tab]");
   for (const tab of tabs) {
     tab.onclick = () => open(tab.id);
@@ -26,6 +29,7 @@ export function open(id) {
     panel.hidden = !on;
     if (on && panel.querySelector("table")) panel.scrollTop = panel.scrollHeight;
   }
+  opened(id);
 }
 
 // Of one that is newly chosen, or has gone, nothing is known that is of now.

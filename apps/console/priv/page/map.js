@@ -72,10 +72,16 @@ export class FloorView {
     this.paths.set(r.id, path);
   }
 
-  // Without a map there is an empty floor, of whole metres, that holds all places where robots were.
+  // What the mission of the chosen robot draws, else that of the fleet.
+  layer() {
+    return this.about?.layer.length ? this.about.layer : this.scene.layer;
+  }
+
+  // Without a map there is an empty floor, of whole metres, that holds all places where robots were, and what is drawn.
   grow() {
     let [left, bottom, right, top] = this.floor ?? [Infinity, Infinity, -Infinity, -Infinity];
-    for (const { x, y } of this.here()) {
+    const drawn = this.layer().flatMap((sign) => sign.points.map(([x, y]) => ({ x, y })));
+    for (const { x, y } of [...this.here(), ...drawn]) {
       [left, right] = [Math.min(left, Math.floor(x - AROUND)), Math.max(right, Math.ceil(x + AROUND))];
       [bottom, top] = [Math.min(bottom, Math.floor(y - AROUND)), Math.max(top, Math.ceil(y + AROUND))];
     }

@@ -6,6 +6,7 @@ import { answerable, controls, enable, follows, ordered, press, reasons, unask }
 import { Events, Given } from "./events.js";
 import { Camera, about, nothing, one, open, tabs } from "./inspector.js";
 import { legend } from "./legend.js";
+import { Messages } from "./messages.js";
 import { Robots, apart, leads } from "./robots.js";
 import { Timeline } from "./timeline.js";
 
@@ -43,6 +44,7 @@ const events = new Events((id, at_s) => {
   if (at_s !== null) timeline.seek(at_s);
 });
 const given = new Given();
+const messages = new Messages((on) => socket?.readyState === WebSocket.OPEN && say(`messages ${on ? "on" : "off"}`));
 const camera = new Camera(floor, (line) => answer({ ok: false, text: line }));
 
 // Beside this page, wherever a proxy puts it; with its token, if its address has one.
@@ -57,6 +59,7 @@ function connect() {
     ahead = -Infinity;
     connected(true);
     if (chosen) say(`look ${chosen}`);
+    messages.again();
   };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
   socket.onclose = () => {
@@ -93,8 +96,8 @@ const refuse = (text) => answer({ ok: false, text });
 function say(line) {
   if (socket?.readyState !== WebSocket.OPEN) return refuse(`not sent, because there is no connection: ${line}`);
   const stop = STOP.test(line);
-  if (silent() && !stop && !line.startsWith("look")) return refuse(`not sent, because the fleet is not heard: ${line}`);
-  if (!/^(look|drive)\b/.test(line) && !timeline.recorded) given.order(line);
+  if (silent() && !stop && !/^(look|messages)\b/.test(line)) return refuse(`not sent, because the fleet is not heard: ${line}`);
+  if (!/^(look|drive|messages)\b/.test(line) && !timeline.recorded) given.order(line);
   if (!silent()) return socket.send(`@${Math.round(performance.now() + ahead)} ${line}`);
   socket.send(line);
   if (stop) refuse("sent, but the fleet is not heard: look whether it stands, and press the robots' own buttons if it does not");
@@ -127,6 +130,7 @@ function hear(message) {
     show(timeline.note(message));
   } else if (message.t === "history") timeline.history(message);
   else if (message.t === "about") told(message);
+  else if (message.t === "messages") messages.hear(message);
   else if (message.t === "answer") answer(message);
 }
 
@@ -161,12 +165,14 @@ function show(next) {
   floor.setScene(scene);
   if (scene.beside) other.setScene(scene.beside);
   const fleet = by("fleet");
+  const real = floor.map.offers.includes("arm");
   const parts = [
     timeline.past !== null && "looking back",
-    scene.formation && `${scene.at_s.toFixed(1)} s`,
+    !real && `${scene.at_s.toFixed(1)} s`,
     scene.pace,
+    real && scene.mission,
     scene.formation && `${scene.formation[0]} ${scene.formation[1].toFixed(1)} m`,
-    scene.formation ? null : `${scene.robots.filter((r) => r.alive).length} robots heard`,
+    real && `${scene.robots.filter((r) => r.alive).length} robots heard`,
     scene.leader ? `${scene.leader} leads` : "no leader",
     scene.error && `${scene.formed ? "formed" : "position error"} ${scene.error.map((e) => e.toFixed(2)).join("/")} m`,
   ];
@@ -182,6 +188,7 @@ function show(next) {
   apart(scene, floor.frame);
   one(scene, chosen, floor);
   events.show(scene);
+  messages.show(scene, chosen ?? null);
 }
 
 function choose(id) {
@@ -285,7 +292,7 @@ by("estop").onclick = estop;
 press(by("reset"), () => say("reset"), refuse);
 // What is in force goes on with the options that it has; another mission is named.
 press(by("start"), () => say(ordered("mission") ? `start ${by("mission").value}`.trim() : "start"), refuse);
-press(by("form"), () => (ordered("shape", "spacing"), say(`formation ${by("shape").value} ${by("spacing").value}`)), refuse);
+press(by("form"), () => (ordered("shape", "spacing"), say(`formation ${by("shape").value} ${by("spacing").value}`.trim())), refuse);
 press(by("drive"), () => drive(!driving), refuse);
 by("speed").onchange = () => (ordered("speed"), say(`speed ${by("speed").value}`));
 by("camera").onclick = () => camera.show(camera.on ? null : chosen);
@@ -310,7 +317,7 @@ by("command").onsubmit = (e) => {
 
 follows("mission", "shape", "spacing", "speed");
 reasons();
-tabs();
+tabs((id) => messages.open(id === "tab-messages"));
 by("legend").ontoggle = () => legend(by("legend").querySelector("ul"));
 write(by("fleet"), "connecting …");
 connect();

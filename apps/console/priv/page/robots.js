@@ -24,7 +24,7 @@ export class Robots {
   row(robot, index, scene, chosen, frame) {
     const { tr, button, cells } = this.rows.get(robot.id) ?? this.made(robot, index);
     const [, state, off, unsure] = cells;
-    off.hidden = scene.formation === null;
+    off.hidden = by("off").hidden;
     badges(state, robot);
     write(off, robot.alive ? metres(robot.off) : "");
     write(unsure, robot.alive && robot.unsure !== null ? `±${metres(robot.unsure)}` : "");

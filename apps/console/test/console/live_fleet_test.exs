@@ -64,6 +64,26 @@ defmodule Console.LiveFleetTest do
     assert {:error, _line} = Live.Fleet.start_link(%{options | map: "nowhere"})
   end
 
+  test "what whole robots say to each other is known on one node, and why it is not elsewhere" do
+    options = Options.trial(%Options{robots: [:mag63, :min63], blobs: :direct, landmark: :none})
+    {:ok, live} = Live.Fleet.start_link(options)
+
+    Swarm.Case.eventually(fn ->
+      {:ok, said} = Live.Fleet.messages(live)
+      Enum.any?(said, &(&1.kind == :round and &1.text =~ ", 2 robots: "))
+    end)
+
+    {:ok, said} = Live.Fleet.messages(live)
+    assert Enum.all?(said, &(&1.from in [:mag63, :min63] and &1.kind != :heartbeat))
+    # By the clock of its scenes.
+    assert List.last(said).last_s <= Live.Fleet.scene(live).at_ms / 1000
+    Lab.Fleet.stop(live)
+
+    {:ok, mesh} = Live.Mesh.start_link()
+    assert {:error, "what real robots say" <> _} = Live.Mesh.messages(mesh)
+    Live.Mesh.stop(mesh)
+  end
+
   test "no order is carried out after a stop that came later, whatever waited before it" do
     options = Options.trial(%Options{robots: [:mag62, :min62], blobs: :direct, landmark: :none})
     {:ok, live} = Live.Fleet.start_link(Map.put(options, :mission, false))

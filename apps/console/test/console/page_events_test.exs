@@ -45,6 +45,50 @@ defmodule Console.PageEventsTest do
     Browser.close(browser)
   end
 
+  test "messages stand in rows, up to the time that is shown, all or those of the chosen robot; without them there is the reason",
+       %{browser: browser, live: live} do
+    say = fn n, at_s, from, to, text ->
+      row = %{n: n, at_s: at_s, last_s: at_s, count: 1}
+      Map.merge(row, %{from: from, to: to, kind: :round, text: text})
+    end
+
+    again = %{say.(1, 1.0, :mag1, :all, "begins") | last_s: 1.5, count: 2}
+    FakeLive.say(live, {:ok, [again]})
+    Browser.run(browser, "document.getElementById('tab-messages').click()")
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length === 1")
+    assert rows(browser, "said") == [["1.0 s", "mag1 → all", "begins / 2 times, until 1.5 s"]]
+
+    FakeLive.say(
+      live,
+      {:ok,
+       [
+         say.(1, 1.0, :mag1, :all, "begins"),
+         say.(2, 2.0, :min1, [:mag2], "its report"),
+         # The scene is of 12 s.
+         say.(3, 12.5, :mag1, :all, "of later")
+       ]}
+    )
+
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length === 2")
+    assert [_all, ["2.0 s", "min1 → mag2", "its report"]] = rows(browser, "said")
+
+    # Choosing shows what is known of the robot; back here there are its own.
+    Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
+    Browser.run(browser, "document.getElementById('tab-messages').click()")
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length === 1")
+    assert rows(browser, "said") == [["1.0 s", "mag1 → all", "begins"]]
+    note = "return document.getElementById('said-note').textContent"
+    assert Browser.run(browser, note) =~ "from and to mag1"
+    FakeLive.change(live, &%{&1 | at_ms: 13_000})
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length === 2")
+
+    FakeLive.say(live, {:error, "they are elsewhere"})
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length === 0")
+    assert Browser.run(browser, note) == "Not known here: they are elsewhere."
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+
   test "a row says when, what and in words; a click chooses the robot, and the moment where there is a time line",
        %{
          browser: browser,

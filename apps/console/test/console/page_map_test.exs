@@ -133,6 +133,52 @@ defmodule Console.PageMapTest do
     end
   end
 
+  test "a finger that stays sends the chosen robot there; one that moves, or is joined by another, does not" do
+    # Near enough to the other robot that a tap would choose that one.
+    {live, browser} = shown(FakeLive.of(@pair), [:kill])
+    Browser.run(browser, "document.querySelector('[data-id=mag1] button').click()")
+    {x, y} = pixel(browser, {4.0, 3.0})
+    {x, y} = {x + 14, y}
+    goal = place(browser, {x, y})
+    chosen = "return document.querySelector('tr.chosen').dataset.id"
+
+    Browser.touch(browser, "touchStart", [{1, x, y}])
+    Browser.await(browser, "return window.floor.ghost?.id === 'mag1'")
+    Browser.touch(browser, "touchEnd", [])
+    assert Browser.run(browser, chosen) == "mag1"
+
+    Browser.await(
+      browser,
+      "return document.getElementById('answer').textContent.startsWith('goto mag1')"
+    )
+
+    assert [{:tell, [:mag1], {:goto, gx, gy, nil}}] = FakeLive.told(live)
+    assert near({gx, gy}, goal, 0.05)
+
+    # What is waited for is longer than a press.
+    wait =
+      "const begun = window.began ??= performance.now(); return performance.now() - begun > 700"
+
+    Browser.touch(browser, "touchStart", [{1, 200, 500}])
+    Browser.touch(browser, "touchMove", [{1, 230, 500}])
+    Browser.await(browser, wait)
+    Browser.touch(browser, "touchEnd", [])
+    Browser.run(browser, "window.began = undefined")
+    Browser.touch(browser, "touchStart", [{1, 200, 500}])
+    Browser.touch(browser, "touchStart", [{1, 200, 500}, {2, 300, 500}])
+    Browser.await(browser, wait)
+    Browser.touch(browser, "touchEnd", [])
+    assert length(FakeLive.told(live)) == 1
+
+    # A tap chooses what is there.
+    Browser.touch(browser, "touchStart", [{1, x, y}])
+    Browser.touch(browser, "touchEnd", [])
+    Browser.await(browser, "return document.querySelector('tr.chosen')?.dataset.id === 'min1'")
+    assert length(FakeLive.told(live)) == 1
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+
   test "what the mission draws is drawn: its points where they are, and their labels" do
     layer = [
       {:polyline, "course", [{2.0, 1.0}, {5.0, 4.0}]},

@@ -57,6 +57,20 @@ defmodule Console.PageMeshTest do
     assert List.last(full.stages).n == full.told
   end
 
+  test "the mission of most and the shape of the leader are in force, as far as robots tell" do
+    status = &struct!(%Status{robot: &1, state: :follow}, &2)
+    lead = status.(:mag1, state: :lead, mission: "landmark", formation: {:wedge, 1.2})
+    others = [status.(:mag2, mission: "landmark"), status.(:min1, mission: "patrol")]
+    scene = fn view -> view |> View.scene(0) |> Map.take([:mission, :formation]) end
+    view = View.update(View.new(), [lead | others], "14:00:00", 0)
+    assert scene.(view) == %{mission: "landmark", formation: {:wedge, 1.2}}
+
+    # Who has gone leads in no shape, and does nothing.
+    view = View.update(view, tl(others), "14:00:01", 1_000)
+    assert scene.(view) == %{mission: "patrol", formation: nil}
+    assert scene.(View.new()) == %{mission: nil, formation: nil}
+  end
+
   test "only robots of one frame have the same number" do
     status = fn id, within, own, x ->
       frame = %Status.Frame{within: within, own: own, start: {x, 0.0}}
@@ -206,6 +220,65 @@ defmodule Console.PageMeshTest do
       Browser.run(browser, "document.querySelector('[data-id=min42] button').click()")
       here.("min42")
       assert text(browser, "doing") =~ "it was started again on its way, and is lost"
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+      Lab.Fleet.stop(fleet)
+    end
+
+    test "the mission in force is shown, and what it draws, which only a robot that is looked at is asked for" do
+      until(fn -> Swarm.status() == [] end)
+      {:ok, live} = Live.Mesh.start_link()
+      robots = fn -> Live.Mesh.robots(live) end
+      {:ok, _page, url} = Page.start_link(module: Live.Mesh, live: live, robots: robots)
+
+      patrol = [
+        robots: [:mag43, :min43],
+        landmark: :none,
+        mission: {Missions.Patrol, loop: :line}
+      ]
+
+      {:ok, fleet} = Lab.Fleet.start_link(patrol)
+      browser = Browser.open({1280, 800})
+      Browser.go(browser, url)
+
+      Browser.await(browser, "return document.getElementById('mission').value === 'patrol'")
+      assert text(browser, "fleet") =~ "patrol"
+      shape = "const shape = document.getElementById('shape'); return "
+      assert Browser.run(browser, shape <> "shape.selectedOptions[0].text") == "not known"
+      assert Browser.run(browser, "return document.getElementById('spacing').value") == ""
+      # Nothing can be formed by that.
+      Browser.run(browser, "document.getElementById('form').click()")
+      assert text(browser, "answer") == "choose a shape first"
+
+      assert :sys.get_state(live).layers == %{}
+      Browser.run(browser, "document.querySelector('[data-id=min43] button').click()")
+
+      Browser.await(
+        browser,
+        "const points = window.floor.about?.layer[0]?.points; return points?.length === 5 && /^1: /.test(points[0][2])"
+      )
+
+      assert Map.keys(:sys.get_state(live).layers) == [:min43]
+      # The line is along x, where no robot is.
+      Browser.await(browser, "return window.floor.floor[0] <= -4 && window.floor.floor[1] <= -2")
+      Browser.run(browser, "document.querySelector('[data-fit=all]').click()")
+      Browser.await(browser, "return window.floor.view.holds([-2, 0])")
+      # A shape that is chosen can be ordered, and is refused by those that have none.
+      Browser.run(browser, """
+      const shape = document.getElementById('shape');
+      shape.value = 'line';
+      shape.dispatchEvent(new Event('input'));
+      """)
+
+      Browser.await(browser, "return document.getElementById('form').ariaDisabled === null")
+      Browser.run(browser, "document.getElementById('form').click()")
+
+      Browser.await(
+        browser,
+        "return /no robot is on a mission that has a formation/.test(document.getElementById('answer').textContent)"
+      )
+
+      Browser.await(browser, shape <> "shape.value === ''")
       assert Browser.errors(browser) == []
       Browser.close(browser)
       Lab.Fleet.stop(fleet)

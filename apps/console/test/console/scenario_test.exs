@@ -37,7 +37,7 @@ defmodule Console.ScenarioTest do
     assert text =~ "a.exs: Too early."
 
     assert text =~
-             "0.5 s  FAILED  {:formed, by_s: 0.5}: not in formation: nobody leads; mag1 search"
+             "0.5 s  FAILED  {:formed, by_s: 0.5}: not in formation: no robot leads; mag1 search"
 
     assert text =~ "a.exs: 1 of 2 expectations failed, after 1.0 s"
   end

@@ -64,6 +64,12 @@ defmodule Console.FakeLive do
   end
 
   @impl Console.Live
+  def messages(live), do: Agent.get(live, &Map.get(&1, :messages, {:ok, []}))
+
+  @doc "What its robots have said to each other."
+  def say(live, messages), do: Agent.update(live, &Map.put(&1, :messages, messages))
+
+  @impl Console.Live
   def pace(live), do: Agent.get(live, & &1.pace)
 
   @doc "How fast it says to go."
@@ -89,6 +95,14 @@ defmodule Console.FakeLive do
 
   @impl Console.Live
   def status(live, _whom), do: live |> scene() |> Console.Cli.Format.everybody()
+
+  @impl Console.Live
+  def statuses(live) do
+    for robot <- scene(live).robots, robot.alive do
+      about = Map.take(robot, [:pose, :state, :uncertainty, :frame, :arming, :says, :leader])
+      struct!(%Swarm.Status{robot: robot.id, age_ms: 40}, about)
+    end
+  end
 
   @impl Console.Live
   def about(live, robot), do: Agent.get(live, & &1.about[robot])

@@ -31,6 +31,7 @@ defmodule Hal.Event do
   | `[:robot, :departure_file, :failed]` | | `robot`, `file`: it cannot be noted that the robot has left its start pose; it is tried again each second |
   | `[:robot, :recorder, :failed]` | `at_ms` | `robots`, `robot` (the first of them), `line`: nothing can be recorded; a folder is tried again |
   | `[:robot, :recorder, :healed]` | `at_ms` | `robots`, `robot`, `file`: it is recorded again |
+  | `[:robot, :incident, :kept]`, `[:robot, :incident, :failed]` | `at_ms` | `robots`, `robot` (the first of them), `why` (lines), `file` or `line`: their last minute is written, or could not be |
   | `[:robot, :executive, :away]` | `at_ms` | `robot`: it was started again away from its start pose, and does not know where it is |
   | `[:robot, :executive, :start]` | `at_ms` | `robot`: the robot is idle |
   | `[:robot, :executive, :slow]` | `at_ms`, `duration_ms` | `robot`: a tick took over 50 ms |

@@ -9,7 +9,7 @@ defmodule Lab.Fleet do
   use GenServer
   alias Hal.{Pose, Ticker}
   alias Lab.Fleet.{Local, Mission, Nodes, PendingStages}
-  alias Lab.Moment
+  alias Lab.{Messages, Moment}
   alias Sim.{Radio, Scene, World}
   alias Lab.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
   alias Swarm.Commands.Client
@@ -91,6 +91,10 @@ defmodule Lab.Fleet do
           :ok | {:error, line :: String.t()}
   def move_landmark(fleet, place), do: GenServer.call(fleet, {:move, place})
 
+  @doc "What its robots have said to each other of late; the error says in one line why that is not known."
+  @spec messages(GenServer.server()) :: {:ok, [Messages.entry()]} | {:error, line :: String.t()}
+  def messages(fleet), do: GenServer.call(fleet, :messages, :infinity)
+
   @doc "The robots that live, in the order of the fleet."
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
@@ -142,6 +146,7 @@ defmodule Lab.Fleet do
       faults: %Faults{},
       ways: [],
       run_log: RunLog.new(elem(setup.mission, 0), @kept),
+      messages: %Messages{},
       said: [],
       ended: nil,
       ticker: Ticker.start(:tick, @period_ms, @period_ms)
@@ -158,6 +163,13 @@ defmodule Lab.Fleet do
   end
 
   def handle_call(:result, _from, s), do: {:reply, s |> run() |> Evaluation.result(), s}
+
+  def handle_call(:messages, _from, %{backend: {Nodes, _backend}} = s) do
+    line = "what robots in processes of their own say to each other does not come by here"
+    {:reply, {:error, line}, s}
+  end
+
+  def handle_call(:messages, _from, s), do: {:reply, {:ok, Messages.list(s.messages)}, s}
   def handle_call(:living, _from, s), do: {:reply, ask(s, :living), s}
   def handle_call(:lines, _from, s), do: {:reply, ask(s, :lines), s}
 
@@ -219,6 +231,9 @@ defmodule Lab.Fleet do
     s = Enum.reduce(events, %{s | run_log: run_log, said: said, script: script}, &play/2)
     {:noreply, s |> cut(now) |> schedule()}
   end
+
+  def handle_info({:sent, from, to, message}, s),
+    do: {:noreply, %{s | messages: Messages.note(s.messages, now(s), [{from, to, message}])}}
 
   def handle_info({:refused, command, refusals}, s) do
     refused = for {id, why} <- refusals, do: {:order_refused, id, command, why}

@@ -3,6 +3,7 @@ defmodule Lab.RadioServer do
   # Runs two radios for simulated robots, as transports of `Swarm.Comms`: one that counts and delivers at once, and one
   # that loses, duplicates and delays messages by `Sim.Radio`.
   use GenServer
+  alias Lab.Messages
   alias Robot.Names
   alias Sim.Radio
   alias Swarm.Comms
@@ -28,22 +29,25 @@ defmodule Lab.RadioServer do
 
   @doc """
   The transport of that part, or without it the one that loses nothing, and the counter of its
-  messages.
+  messages. A `listener` gets `{:sent, from, to, message}` for each that `Lab.Messages` keeps.
   """
-  @spec radio(pid() | nil) :: {{module(), atom(), list()}, pid() | counter()}
-  def radio(nil), do: clear()
-  def radio(air), do: {transport(air), air}
+  @spec radio(pid() | nil, listener :: pid() | nil) ::
+          {{module(), atom(), list()}, pid() | counter()}
+  def radio(air, listener \\ nil)
+  def radio(nil, listener), do: clear(listener)
+  def radio(air, listener), do: {{__MODULE__, :transmit, [air, listener]}, air}
 
   @doc "The transport that never loses, and its counter."
-  @spec clear() :: {{module(), atom(), list()}, counter()}
-  def clear do
+  @spec clear(listener :: pid() | nil) :: {{module(), atom(), list()}, counter()}
+  def clear(listener \\ nil) do
     counter = :counters.new(1, [:write_concurrency])
-    {{__MODULE__, :hand_on, [counter]}, counter}
+    {{__MODULE__, :hand_on, [counter, listener]}, counter}
   end
 
   @doc false
-  @spec hand_on(counter(), atom(), :all | [atom()], Swarm.Message.t()) :: :ok
-  def hand_on(counter, from, to, message) do
+  @spec hand_on(counter(), pid() | nil, atom(), :all | [atom()], Swarm.Message.t()) :: :ok
+  def hand_on(counter, listener, from, to, message) do
+    tell(listener, from, to, message)
     :counters.add(counter, 1, length(addressed(from, to)))
     Transport.transmit(from, to, message)
   end
@@ -52,13 +56,19 @@ defmodule Lab.RadioServer do
   @spec start_link(keyword()) :: GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, Radio.new(options))
 
-  # The transport of a radio.
-  defp transport(air), do: {__MODULE__, :transmit, [air]}
-
   @doc false
-  @spec transmit(pid(), atom(), :all | [atom()], Swarm.Message.t()) :: :ok
-  def transmit(air, from, to, message),
-    do: GenServer.cast(air, {:transmit, from, addressed(from, to), message})
+  @spec transmit(pid(), pid() | nil, atom(), :all | [atom()], Swarm.Message.t()) :: :ok
+  def transmit(air, listener, from, to, message) do
+    tell(listener, from, to, message)
+    GenServer.cast(air, {:transmit, from, addressed(from, to), message})
+  end
+
+  defp tell(nil, _from, _to, _message), do: :ok
+
+  defp tell(listener, from, to, message) do
+    if Messages.told?(message), do: send(listener, {:sent, from, to, message})
+    :ok
+  end
 
   # Each copy is counted, and lost, separately.
   defp addressed(from, :all), do: List.delete(Transport.robots(), from)

@@ -166,4 +166,7 @@ defmodule Lab.Replay do
 
   @impl Lab.Replay.Kind
   def facts(%__MODULE__{}, {_at_ms, entries}), do: Recording.Facts.of(entries)
+
+  @impl Lab.Replay.Kind
+  def messages(%__MODULE__{}, {_at_ms, entries}), do: Lab.Messages.of_entries(entries)
 end

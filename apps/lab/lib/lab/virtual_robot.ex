@@ -9,6 +9,9 @@ defmodule Lab.VirtualRobot do
 
   @armed_ms 5_000
   @look_ms 10
+  # What it does is told ten times a second.
+  @recent_ms 1_000
+  @devices [:camera, :drive, :ptz, :scan]
 
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
@@ -118,7 +121,30 @@ defmodule Lab.VirtualRobot do
            do: {if(state == :disarmed, do: :disarmed, else: :line_lost), why},
            else: (_armed_or_not_known -> nil)
 
-    [crashed: with({_at_ms, line} <- Enum.max(crashed, fn -> nil end), do: line), arming: arming]
+    [
+      crashed: with({_at_ms, line} <- Enum.max(crashed, fn -> nil end), do: line),
+      arming: arming,
+      fault: fault(board),
+      offline: offline(board)
+    ]
+  end
+
+  # An executive that is being started again stands for nothing.
+  defp fault(board) do
+    with {:ok, %{fault: fault}, _at_ms} <- Board.fetch(board, :doing, @recent_ms),
+         do: fault,
+         else: (_unknown -> nil)
+  end
+
+  defp offline(board) do
+    offline =
+      for device <- @devices,
+          {:ok, {:offline, _reason}, _at_ms} <- [
+            Board.fetch(board, {:health, device}, :infinity)
+          ],
+          do: device
+
+    if offline != [], do: offline
   end
 
   defp believed(board) do

@@ -44,6 +44,27 @@ defmodule Lab.FleetTest do
     eventually(fn -> Swarm.tell(:mag71, "ping") |> elem(1) =~ "no robot" end)
   end
 
+  test "a robot counts its way, its stops, how late it decides, and what was started again" do
+    fleet = fleet(%{robots: [:mag74], landmark: :none, mission: false})
+    eventually(fn -> match?(%Swarm.Status{pose: %Pose{}}, Swarm.status(:mag74)) end)
+    place = Pose.place(truth(fleet, :mag74), {0.6, 0.0})
+    assert order(fn -> Swarm.goto(:mag74, place) end) == :ok
+    eventually(fn -> Swarm.status(:mag74).state == :done end)
+    before = Swarm.status(:mag74).meters
+    assert before.distance_m > 0.4 and before.distance_m < 0.8
+    assert before.ticks > 10 and before.restarts.pilot == 0
+
+    assert Swarm.estop() == :ok
+    Process.exit(Names.whereis(:mag74, :pilot), :kill)
+    eventually(fn -> Swarm.status(:mag74).meters.restarts.pilot == 1 end)
+    meters = Swarm.status(:mag74).meters
+    assert meters.restarts.gate == 0
+    assert meters.stops.estop == Map.get(before.stops, :estop, 0) + 1
+    assert meters.distance_m >= before.distance_m
+    Swarm.reset()
+    stop(fleet)
+  end
+
   test "a robot with a lidar goes by its scans, tells what it hears, and stands while they do not come" do
     fleet = fleet(%{robots: [:burger71], landmark: :none, mission: false})
     eventually(fn -> match?({:ok, [_ | _]}, Swarm.sonar(:burger71)) end)
@@ -99,6 +120,32 @@ defmodule Lab.FleetTest do
     # An order to this robot alone ends it.
     assert order(fn -> Swarm.tell(:mag79, "wander") end) == :ok
     refute inspect(Swarm.status(:mag79)) =~ "CRASHED"
+    stop(fleet)
+  end
+
+  test "what keeps a robot from its work is in the scene: a fault, devices that are offline" do
+    fleet = fleet(%{robots: [:mag77], landmark: :none, mission: false})
+    robot = fn -> hd(Fleet.scene(fleet).robots) end
+    eventually(fn -> robot.().state == :idle end)
+    assert {robot.().fault, robot.().offline} == {nil, []}
+
+    {:ok, board} = Board.find(:mag77)
+    condition = &Robot.Devices.health(board, {:health, &1, {&2, Board.now(board)}})
+    condition.(:ptz, {:offline, :silent})
+    condition.(:camera, {:offline, :enoent})
+    eventually(fn -> robot.().offline == [:camera, :ptz] end)
+    condition.(:ptz, :online)
+    eventually(fn -> robot.().offline == [:camera] end)
+
+    # What the executive writes when it stands for a fault, until its next tick.
+    {:ok, doing, _at_ms} = Board.fetch(board, :doing, :infinity)
+
+    eventually(fn ->
+      doing = %{doing | fault: "both bumpers are pressed"}
+      _written? = Board.put(board, :executive, :doing, doing, Board.now(board))
+      robot.().fault == "both bumpers are pressed"
+    end)
+
     stop(fleet)
   end
 

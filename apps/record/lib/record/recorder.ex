@@ -31,8 +31,6 @@ defmodule Record.Recorder do
   # What comes in faster is written sooner.
   @most_entries 5_000
   @call_ms 60_000
-  # Two readings of a clock that stands still by the other one.
-  @same_ms 100
 
   @doc """
   Starts it. Options: `robots` (ids), `file` (options of `Mcap.FileWriter`), `pictures` of their
@@ -52,13 +50,14 @@ defmodule Record.Recorder do
   def child_spec(options),
     do: %{id: __MODULE__, start: {__MODULE__, :start_link, [options]}, shutdown: @call_ms}
 
-  @doc "Sends an entry of a robot's trace to its recorder, if there is one. Never waits."
+  @doc "Sends an entry of a robot's trace to its recorder and to what keeps its last minute, if there are. Never waits."
   @spec trace(robot :: atom(), Robot.Trace.entry()) :: :ok
   def trace(robot, entry) do
-    case Names.lookup(robot, :recorder) do
-      {recorder, %Queue{} = queue} -> Queue.send_entry(queue, recorder, robot, entry)
-      nil -> :ok
-    end
+    for part <- [:recorder, :incidents],
+        {recorder, %Queue{} = queue} <- [Names.lookup(robot, part)],
+        do: Queue.send_entry(queue, recorder, robot, entry)
+
+    :ok
   end
 
   @doc """
@@ -237,8 +236,10 @@ defmodule Record.Recorder do
     do: add(%{s | lost: s.lost + count}, id, entry)
 
   defp take(s, id, {_role, kind, %_{} = state, at_ms} = entry, now_ms)
-       when kind in [:begin, :checkpoint],
-       do: s |> know(id, state, now_ms + s.unix_ms - at_ms) |> add(id, entry)
+       when kind in [:begin, :checkpoint] do
+    robots = Output.know(s.robots, id, state, now_ms + s.unix_ms - at_ms)
+    add(%{s | robots: robots}, id, entry)
+  end
 
   defp take(s, id, entry, _now_ms), do: add(s, id, entry)
 
@@ -251,15 +252,6 @@ defmodule Record.Recorder do
   defp add(s, id, entry), do: keep(%{s | owed: [{id, entry} | s.owed]}, id, entry)
 
   defp keep(s, id, entry), do: %{s | entries: [{id, entry} | s.entries], count: s.count + 1}
-
-  # A state tells the body, and the time at which it was sent the offset of the robot's clock.
-  defp know(s, id, state, offset_ms) do
-    robot = s.robots[id]
-    profile = robot.profile || Map.get(state, :profile)
-    known? = robot.offset_ms != nil and abs(robot.offset_ms - offset_ms) < @same_ms
-    offset_ms = if known?, do: robot.offset_ms, else: offset_ms
-    put_in(s.robots[id], %{offset_ms: offset_ms, profile: profile})
-  end
 
   defp taken(s, entries) do
     for {id, {role, _kind, _what, _at_ms}} <- entries, do: Queue.taken(s.queues[id], role)

@@ -120,7 +120,7 @@ defmodule Record.RecorderTest do
 
     assert {:ok, config} = Swarm.MemberSpec.config(file)
     assert config.trace == {Recorder, :trace, [:rec10]}
-    {:ok, child} = Swarm.MemberSpec.recorder(file)
+    {:ok, [child]} = Swarm.MemberSpec.recorders(file)
     start_supervised!({Swarm.Supervisor.BackoffSupervisor, child})
     {first, _queue} = Names.lookup(:rec10, :recorder)
     Process.exit(first, :kill)

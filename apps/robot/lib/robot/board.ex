@@ -63,7 +63,8 @@ defmodule Robot.Board do
   """
   use GenServer
   alias Robot.Board.{Files, Latch}
-  alias Robot.{Departure, Names}
+  alias Hal.{Odometry, Pose}
+  alias Robot.{Departure, Meters, Names}
   alias Vision.Detections
 
   @again_ms 1_000
@@ -73,14 +74,15 @@ defmodule Robot.Board do
     {{{:"$1", :_}, :_, :_}, [{:"=/=", :"$1", :peer}], [:"$_"]}
   ]
 
-  @enforce_keys [:robot, :table, :latch, :clock, :since_ms]
+  @enforce_keys [:robot, :table, :latch, :meters, :clock, :since_ms]
   defstruct @enforce_keys
 
-  @typedoc "The tables and the clock, for readers and writers; the board started at `since_ms`."
+  @typedoc "The tables, the meters and the clock, for readers and writers; the board started at `since_ms`."
   @type t :: %__MODULE__{
           robot: atom(),
           table: :ets.tid(),
           latch: :ets.tid(),
+          meters: Meters.t(),
           clock: {module(), atom(), list()},
           since_ms: integer()
         }
@@ -182,8 +184,18 @@ defmodule Robot.Board do
 
   def sense(_board, _device, {:detections, _malformed}), do: :ok
 
+  def sense(board, :drive, {:odometry, %Odometry{} = now} = reading) do
+    with {:ok, %{frame: frame, pose: pose}, _at_ms} when frame == now.frame <-
+           fetch(board, :odometry, :infinity, 0),
+         do: Meters.drove(board.meters, Pose.distance(pose, now.pose))
+
+    put_reading(board, :drive, reading)
+  end
+
   # A user's driver may send readings that have no key here; they must not crash its device.
-  def sense(board, device, {key, value}) do
+  def sense(board, device, {_key, _value} = reading), do: put_reading(board, device, reading)
+
+  defp put_reading(board, device, {key, value}) do
     if writer(key), do: put(board, device, key, value, now(board)), else: :ok
   end
 
@@ -306,6 +318,7 @@ defmodule Robot.Board do
       robot: config.id,
       table: :ets.new(__MODULE__, [:public, read_concurrency: true]),
       latch: Latch.new(latched?),
+      meters: Meters.new(),
       clock: config.clock,
       since_ms: Robot.Config.now(config)
     }

@@ -15,7 +15,7 @@ defmodule Robot.Command do
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
   | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.BehaviourRegistry`) |
-  | `lead`, `start`, `ping` | `:lead`, `:start`, `:ping` |
+  | `lead`, `start`, `ping`, `keep` | `:lead`, `:start`, `:ping`, `:keep` |
   | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.MissionRegistry.Text`) |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
 
@@ -36,6 +36,7 @@ defmodule Robot.Command do
           | :rest
           | {:square, side :: float() | nil}
           | :ping
+          | :keep
           | :arm
           | :disarm
           | :acknowledge
@@ -69,6 +70,7 @@ defmodule Robot.Command do
     {"run", [:behaviour], [:options]},
     {"start", [], [:mission, :options]},
     {"ping", [], []},
+    {"keep", [], []},
     {"arm", [], []},
     {"disarm", [], []},
     {"acknowledge", [], []}
@@ -182,6 +184,7 @@ defmodule Robot.Command do
   defp build("square", []), do: {:square, nil}
   defp build("square", [side]), do: {:square, side}
   defp build("ping", []), do: :ping
+  defp build("keep", []), do: :keep
   defp build("arm", []), do: :arm
   defp build("disarm", []), do: :disarm
   defp build("acknowledge", []), do: :acknowledge
@@ -213,7 +216,18 @@ defmodule Robot.Command do
   """
   @spec check(term(), [atom()]) :: {:ok, t()} | {:error, String.t()}
   def check(word, _known)
-      when word in [:stop, :lead, :start, :wander, :rest, :ping, :arm, :disarm, :acknowledge],
+      when word in [
+             :stop,
+             :lead,
+             :start,
+             :wander,
+             :rest,
+             :ping,
+             :keep,
+             :arm,
+             :disarm,
+             :acknowledge
+           ],
       do: {:ok, word}
 
   def check({word, text}, known) when word in [:start, :run] and is_binary(text),

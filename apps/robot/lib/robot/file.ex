@@ -41,6 +41,7 @@ defmodule Robot.File do
                 estop_file: nil,
                 console: nil,
                 record: nil,
+                incidents: nil,
                 network: [],
                 policies: []
               ]
@@ -66,6 +67,7 @@ defmodule Robot.File do
           estop_file: Path.t() | nil,
           console: keyword() | nil,
           record: keyword() | nil,
+          incidents: keyword() | nil,
           network: keyword(),
           policies: keyword()
         }

@@ -5,9 +5,10 @@ defmodule Robot.Host do
   """
   use GenServer
   alias Hal.{Device, Event, Ticker}
-  alias Robot.{Board, Names, Role, Trace}
-  alias Robot.Control.Crash
+  alias Robot.{Board, Meters, Names, Role, Trace}
+  alias Robot.Control.{Crash, Executive}
   alias Robot.Host.LoadShedder
+  alias Robot.Safety.Reflex
 
   @slow_us 50_000
   @dropped_every_ms 60_000
@@ -39,6 +40,7 @@ defmodule Robot.Host do
   @spec begin({module(), Robot.Config.t()}) :: map()
   def begin({role, config}) do
     board = Board.find!(config.id)
+    Meters.began(board.meters, role.name())
     at_ms = Robot.Config.now(config)
     trace = if role.name() in Trace.roles(), do: config.trace
     config = %{config | trace: trace, boot: config.boot || System.system_time(:nanosecond)}
@@ -75,6 +77,7 @@ defmodule Robot.Host do
   def handle_info(:tick, s) do
     begun_us = System.monotonic_time(:microsecond)
     at_ms = Robot.Config.now(s.config)
+    late(s)
     checkpoint(s, at_ms)
 
     case tick(s, at_ms) do
@@ -88,6 +91,12 @@ defmodule Robot.Host do
   end
 
   def handle_info(message, s), do: {:noreply, arrived({:info, message}, s)}
+
+  # Of its decisions only: the gate's steps are twice as many, and wait for nothing.
+  defp late(%{role: Executive, ticker: %Ticker{due_ms: due_ms}, board: board}),
+    do: Meters.late(board.meters, Hal.Clock.now_ms() - due_ms)
+
+  defp late(_s), do: :ok
 
   defp slow(_s, took_us) when took_us <= @slow_us, do: :ok
 
@@ -252,6 +261,13 @@ defmodule Robot.Host do
 
   defp act({:claim, _claim}, _s, _at_ms), do: :ok
 
-  defp act({:event, name, about}, s, at_ms),
+  defp act({:event, [:robot, :gate, :limits] = name, %{limits: limits} = about}, s, at_ms) do
+    for limit <- limits, limit in Reflex.stops(), do: Meters.stopped(s.board.meters, limit)
+    told(name, about, s, at_ms)
+  end
+
+  defp act({:event, name, about}, s, at_ms), do: told(name, about, s, at_ms)
+
+  defp told(name, about, s, at_ms),
     do: Event.execute(name, %{at_ms: at_ms}, Map.put(about, :robot, s.config.id))
 end

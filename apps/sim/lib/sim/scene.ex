@@ -4,7 +4,7 @@ defmodule Sim.Scene do
 
   The lockstep run and the live fleet both produce it, so the terminal, the page and the picture
   can draw either. Poses are the true ones, in metres and radians, in the frame `map`; `at_ms`
-  counts simulated milliseconds from the start. `mission` is the name of the mission that most robots run, `nil` if that is not known;
+  counts simulated milliseconds from the start. `mission` is the name of the mission that most robots run, `formation` the shape in force, `nil` if that is not known;
   `layer` is what it draws over the map (`Robot.Mission`).
   """
   alias Hal.Pose
@@ -80,7 +80,7 @@ defmodule Sim.Scene do
           layer: [tuple()],
           leader: atom() | nil,
           epoch: non_neg_integer(),
-          formation: {atom(), float()},
+          formation: {atom(), float()} | nil,
           error: {mean :: float(), max :: float()} | nil,
           formed?: boolean(),
           estop: estop() | nil,

@@ -75,8 +75,8 @@ defmodule Swarm.Application do
   end
 
   defp recorder({file, _config}) do
-    with {:ok, recorder} <- MemberSpec.recorder(file),
-         do: {:ok, for(recorder <- List.wrap(recorder), do: {:recorder, recorder})}
+    with {:ok, recorders} <- MemberSpec.recorders(file),
+         do: {:ok, for(recorder <- recorders, do: {:recorder, recorder})}
   end
 
   defp recorder(_none), do: {:ok, []}

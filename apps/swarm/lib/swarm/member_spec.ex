@@ -78,9 +78,9 @@ defmodule Swarm.MemberSpec do
   def config(%Robot.File{} = file) do
     with :ok <- listed(file),
          {:ok, mission} <- mission(file.policies),
-         {:ok, recorder} <- recorder(file),
+         {:ok, recorders} <- recorders(file),
          {:ok, config} <- Robot.File.config(file) do
-      {:ok, config |> recorded(recorder) |> Map.put(:mission, mission) |> Comms.join()}
+      {:ok, config |> recorded(recorders) |> Map.put(:mission, mission) |> Comms.join()}
     end
   end
 
@@ -92,34 +92,38 @@ defmodule Swarm.MemberSpec do
         {:error, "network.fleet: expected all robots of the fleet, with #{id}, whose file it is"}
   end
 
-  defp recorded(config, nil), do: config
+  defp recorded(config, []), do: config
 
-  defp recorded(config, {recorder, {id, _options}}),
-    do: %{config | trace: {recorder, :trace, [id]}}
+  defp recorded(%{id: id} = config, _recorders),
+    do: %{config | trace: {Application.get_env(:swarm, :recorder), :trace, [id]}}
 
   @doc """
-  The robot's recorder, a part of the node, as a child of `Swarm.Supervisor`; `nil` if it is not recorded. The configuration
-  names the module, which lives in an app above this one, and to which the robot's processes hand their trace
-  (`t:Robot.Trace.entry/0`):
+  What records the robot (`record:`) and keeps its last minute (`incidents:`), parts of the node, as children of
+  `Swarm.Supervisor`. The configuration names the modules, which live in an app above this one; the robot's processes hand their trace
+  (`t:Robot.Trace.entry/0`) to the first:
 
-      config :swarm, recorder: Record.Recorder
+      config :swarm, recorder: Record.Recorder, incidents: Record.Incidents
   """
-  @spec recorder(Robot.File.t()) ::
-          {:ok, {module(), {robot :: atom(), keyword()}} | nil} | {:error, line :: String.t()}
-  def recorder(%Robot.File{record: nil}), do: {:ok, nil}
+  @spec recorders(Robot.File.t()) ::
+          {:ok, [{module(), {robot :: atom(), keyword()}}]} | {:error, line :: String.t()}
+  def recorders(%Robot.File{id: id} = file) do
+    with {:ok, record} <- part(:record, file.record, :recorder, &RecordOptions.check/1),
+         {:ok, kept} <-
+           part(:incidents, file.incidents, :incidents, &RecordOptions.check_incidents/1),
+         do: {:ok, for({module, options} <- record ++ kept, do: {module, {id, options}})}
+  end
 
-  def recorder(%Robot.File{id: id, record: options}) do
-    module = Application.get_env(:swarm, :recorder)
+  defp part(_key, nil, _setting, _check), do: {:ok, []}
 
-    cond do
-      module == nil ->
-        {:error, "record: no recorder is configured (config :swarm, recorder: …)"}
+  defp part(key, options, setting, check) do
+    case {Application.get_env(:swarm, :recorder), Application.get_env(:swarm, setting)} do
+      {recorder, module} when recorder == nil or module == nil ->
+        {:error, "#{key}: no recorder is configured (config :swarm, #{setting}: …)"}
 
-      not Code.ensure_loaded?(module) ->
-        {:error, "record: #{inspect(module)} is configured, but not part of this release"}
-
-      true ->
-        with {:ok, all} <- RecordOptions.check(options), do: {:ok, {module, {id, all}}}
+      {_recorder, module} ->
+        if Code.ensure_loaded?(module),
+          do: with({:ok, all} <- check.(options), do: {:ok, [{module, all}]}),
+          else: {:error, "#{key}: #{inspect(module)} is configured, but not part of this release"}
     end
   end
 

@@ -86,7 +86,7 @@ defmodule Swarm.Order do
       else: {:error, "expected a command of Robot.Command, got #{brief(command)}"}
   end
 
-  defp known?(word) when word in [:stop, :lead, :start, :ping, :wander, :rest], do: true
+  defp known?(word) when word in [:stop, :lead, :start, :ping, :keep, :wander, :rest], do: true
   defp known?({:follow_the_leader, robot}), do: Wire.name?(robot)
   defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})

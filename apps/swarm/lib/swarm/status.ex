@@ -9,6 +9,8 @@ defmodule Swarm.Status do
   robot's in that of its start pose (`frame`; `Swarm.Status.Frame`). `epoch` counts the
   elections that its mission knows of.
 
+  `mission` is the name of its mission, and `formation` the shape that a leader leads others in; a row has neither.
+
   `weights` are all behaviours that wished for something, with the weights by which they were compared, the chosen one
   (`by`) first; `way` are the corners of the way that it takes round what stands about, the goal last, in the frame of its
   pose. A row has neither.
@@ -49,6 +51,8 @@ defmodule Swarm.Status do
   After the age stands where its camera looks (`head`), and what that shows of the landmark (`sees`; `Swarm.Status.Sight`), of
   robots that have a pan-tilt unit and a camera: `looks at 12, 0 deg (zoom 49 deg), sees YellowLandmark at -12 deg, 2.31 m`.
 
+  `meters` are its counts since its board began (`Robot.Meters`); the line does not have them.
+
   A robot whose machine has no network says `NO NETWORK`, and why (`network`; `Mesh.fault/0`).
 
   The status of a robot that does not answer comes from its row on the blackboard (`from: :row`),
@@ -57,13 +61,15 @@ defmodule Swarm.Status do
   alias Hal.Device.Explanation
   alias Hal.{Odometry, Pose, Twist}
   alias Robot.Board
+  alias Robot.Mission.Manual
   alias Robot.Safety.LivenessMonitor
-  alias Swarm.EStop
+  alias Swarm.{EStop, MissionRegistry}
   alias Swarm.Message.Receiver
   alias Swarm.Membership.Peers
   alias Swarm.Status.{Frame, Sight}
 
   @recently_ms 60_000
+  @ahead_m 1.0
 
   # One line a field, in the order in which the status line has them: its default, and how a row of the blackboard has it
   # (`Swarm.Status.Row`), `nil` for not at all. `read/2` takes it from the robot's board, `Swarm.Status.Words.of/2` puts it in words.
@@ -72,6 +78,8 @@ defmodule Swarm.Status do
     node: {nil, :name},
     body: {nil, nil},
     state: {:idle, :name},
+    mission: {nil, nil},
+    formation: {nil, nil},
     by: {nil, :word},
     weights: {[], nil},
     way: {[], nil},
@@ -98,6 +106,7 @@ defmodule Swarm.Status do
     view: {nil, :view},
     hears: {[], nil},
     network: {nil, nil},
+    meters: {nil, nil},
     rejected: {%{}, :sum},
     age_ms: {nil, :age},
     head: {nil, {:maybe, :head}},
@@ -121,6 +130,8 @@ defmodule Swarm.Status do
           node: node() | String.t() | nil,
           body: body() | nil,
           state: atom() | String.t(),
+          mission: String.t() | nil,
+          formation: {kind :: atom(), spacing_m :: float()} | nil,
           by: atom() | String.t(),
           weights: [{by :: atom(), weight :: float()}],
           way: [Pose.point()],
@@ -150,6 +161,7 @@ defmodule Swarm.Status do
           view: view() | nil,
           rejected: %{atom() => pos_integer()},
           network: String.t() | nil,
+          meters: Robot.Meters.counts() | nil,
           head: Sight.head(),
           sees: Sight.t(),
           age_ms: non_neg_integer() | nil
@@ -192,7 +204,25 @@ defmodule Swarm.Status do
     do: %{radius: profile.radius, corners: Hal.Profile.corners(profile)}
 
   defp read(:network, _seen), do: Mesh.fault()
+  defp read(:meters, %{board: %Board{meters: meters}}), do: Robot.Meters.read(meters)
+  defp read(:meters, _in_lockstep), do: nil
   defp read(:state, %{entries: entries}), do: entries |> value(:mission) |> state()
+
+  defp read(:mission, %{entries: entries}) do
+    case value(entries, :mission) do
+      %{state: {module, _phase}} when module != Manual -> MissionRegistry.name(module)
+      _idle_or_by_hand -> nil
+    end
+  end
+
+  # What stands ahead of a leader changes no shape, but the places in it.
+  defp read(:formation, %{entries: entries}) do
+    with %{state: {module, _phase}, claim: claim} <- value(entries, :mission),
+         %Pose{} = pose <- value(entries, :pose),
+         %{formation: formation} <- Robot.Mission.shape(module, claim, pose, @ahead_m),
+         do: formation,
+         else: (_leads_none -> nil)
+  end
 
   defp read(:limits, %{entries: entries}),
     do: (entry(entries, :doing, :limits) || []) ++ (entry(entries, :driving, :limits) || [])
@@ -294,7 +324,7 @@ defmodule Swarm.Status do
   defp field(nil, _key), do: nil
   defp field(map, key), do: Map.get(map, key)
 
-  defp state(%{state: {Robot.Mission.Manual, :ready}}), do: :idle
+  defp state(%{state: {Manual, :ready}}), do: :idle
   defp state(%{state: {_module, phase}}), do: phase
   defp state(_idle), do: :idle
 

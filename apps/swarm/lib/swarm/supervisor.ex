@@ -12,7 +12,7 @@ defmodule Swarm.Supervisor do
       |   |-- Swarm.Replacement         gives the robots of this node other missions
       |   |-- Mesh.Supervisor           the other nodes, where there is a mesh; Swarm.MeshConsumer hears it
       |   |-- Swarm.Host.Systemd        tells systemd, where there is one
-      |   `-- the recorder              records the robot, if its file says so (`Swarm.MemberSpec.recorder/1`)
+      |   `-- the recorder              records the robot, if its file says so (`Swarm.MemberSpec.recorders/1`)
       `-- Robot.Fleet                   the robots
 
   Robots can do without these parts: they drive on, and enter a new directory by themselves.
@@ -53,7 +53,7 @@ defmodule Swarm.Supervisor do
 
   @doc """
   Starts the parts of the node, without a robot; `mesh` comes from `Mesh.Options.prepare/1`,
-  `machine` are the options of `Swarm.Host.Systemd`, `recorder` the child that records the robot.
+  `machine` are the options of `Swarm.Host.Systemd`, `recorder` a child that records the robot.
   """
   @spec start_link(keyword()) :: Supervisor.on_start()
   def start_link(options), do: Supervisor.start_link(__MODULE__, options)

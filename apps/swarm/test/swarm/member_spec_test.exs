@@ -22,9 +22,9 @@ defmodule Swarm.MemberSpecTest do
     named(Mine.NotInThisBuild)
     line = "record: Mine.NotInThisBuild is configured, but not part of this release"
     assert MemberSpec.config(@recorded) == {:error, line}
-    assert MemberSpec.recorder(@recorded) == {:error, line}
+    assert MemberSpec.recorders(@recorded) == {:error, line}
     assert {:ok, %{trace: nil}} = MemberSpec.config(@file_of)
-    assert MemberSpec.recorder(@file_of) == {:ok, nil}
+    assert MemberSpec.recorders(@file_of) == {:ok, []}
 
     named(nil)
     line = "record: no recorder is configured (config :swarm, recorder: …)"
@@ -36,7 +36,7 @@ defmodule Swarm.MemberSpecTest do
     named(Swarm.StandMission)
     assert {:ok, %{trace: {Swarm.StandMission, :trace, [:spec1]}}} = MemberSpec.config(@recorded)
 
-    assert {:ok, {Swarm.StandMission, {:spec1, options}}} = MemberSpec.recorder(@recorded)
+    assert {:ok, [{Swarm.StandMission, {:spec1, options}}]} = MemberSpec.recorders(@recorded)
     assert options[:folder] == "/tmp/runs"
     assert options[:limit_mb] == 500
   end

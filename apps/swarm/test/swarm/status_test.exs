@@ -127,6 +127,42 @@ defmodule Swarm.StatusTest do
     assert line =~ "status_snoar"
   end
 
+  defmodule Drawing do
+    @moduledoc "A mission that draws so many points, and leads the others in a wedge."
+    @behaviour Robot.Mission
+    @impl Robot.Mission
+    def init(_robot, options), do: {:lead, options[:points], [{:claim, %{phase: :lead}}]}
+    @impl Robot.Mission
+    def handle(_event, points), do: {:lead, points, []}
+    @impl Robot.Mission
+    def layer(points),
+      do: [{:points, "points", for(k <- 1..points//1, do: {k * 0.1, 0.0, "point #{k}"})}]
+
+    @impl Robot.Mission
+    def shape(%{phase: :lead}, _pose, _ahead_m), do: %{formation: {:wedge, 1.5}, slots: %{}}
+    def shape(_claim, _pose, _ahead_m), do: nil
+  end
+
+  test "what a mission draws, its name and its shape are asked for; what is too much is refused" do
+    id = robot(:status_layer)
+    assert Swarm.layer(id) == {:ok, []}
+    assert %Status{mission: nil, formation: nil} = Swarm.status(id)
+
+    :ok = Robot.Control.Pilot.start(id, Drawing, points: 2)
+    drawn = [{:points, "points", [{0.1, 0.0, "point 1"}, {0.2, 0.0, "point 2"}]}]
+    eventually(fn -> Swarm.layer(id) == {:ok, drawn} end)
+    Board.put(Board.find!(id), :executive, :pose, Pose.new(1.0, 2.0), Board.now(Board.find!(id)))
+
+    assert %Status{mission: "Swarm.StatusTest.Drawing", formation: {:wedge, 1.5}} =
+             Swarm.status(id)
+
+    :ok = Robot.Control.Pilot.start(id, Drawing, points: 4_000)
+    too_much = {:error, "status_layer: its mission draws too much to be sent"}
+    eventually(fn -> Swarm.layer(id) == too_much end)
+    assert {:error, line} = Swarm.layer(:status_layre)
+    assert line =~ "status_layre"
+  end
+
   test "no escape of a row reaches a terminal" do
     status = %Status{robot: :mag1, node: node(), by: :follow, says: "a\e[2Jb\n", age_ms: 5}
     row = Status.Row.encode(status)

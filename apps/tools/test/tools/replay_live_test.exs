@@ -22,8 +22,9 @@ defmodule Tools.ReplayLiveTest do
     heard(fn -> Replay.run(options) end)
   end
 
-  defp record(path) do
-    options = Runs.options("--headless --hardware 1 --robots 2 --duration 3", ["--record", path])
+  defp record(path, more \\ "") do
+    line = "--headless --hardware 1 --robots 2 --duration 3 " <> more
+    options = Runs.options(line, ["--record", path])
     assert Options.real_time?(options)
     stop = [stop: &Lab.Fleet.stop/1]
     heard(fn -> Live.Recording.run(options, &Demo.run(&1, Lab.Fleet, stop)) end)
@@ -87,6 +88,35 @@ defmodule Tools.ReplayLiveTest do
     assert text =~ "are as recorded."
     assert {2, text, ""} = replay(path, ["--against", cut])
     assert text =~ ~r/^The two are the same until one ends, after \d\.\d s\.$/m
+  end
+
+  test "what a mission draws is in a replay of live robots, on the page of the chosen one, too",
+       %{
+         tmp_dir: folder
+       } do
+    path = Path.join(folder, "patrol.mcap")
+    assert {_status, _text, ""} = record(path, "--mission patrol --landmark none")
+    {:ok, file} = Recording.File.open(path)
+    start = Lab.Replay.Robots.new(file)
+    # Nobody draws, and no shape is known, before anything was heard.
+    assert %{layer: [], formation: nil} = Kind.scene(start)
+    ticks = Enum.to_list(Recording.File.ticks(file))
+    {_all, last} = Enum.map_reduce(ticks, start, &forwards/2)
+    assert [{:points, "points" <> _, points}] = Kind.scene(last).layer
+    assert length(points) == 8
+    assert [{:points, _name, ^points}] = Lab.Replay.Robots.layer(last, :mag1)
+
+    {:ok, recording} = Replay.Recording.open(path)
+
+    live = :proc_lib.spawn_link(fn -> Replay.Live.loop(Replay.Live.new([recording], 0, nil)) end)
+
+    eventually = fn ->
+      {:ok, _at} = Replay.Live.answer(live, "goto 2")
+      match?(%{layer: [%{kind: :points, points: [_ | _]}]}, Replay.Live.about(live, :mag1))
+    end
+
+    Swarm.Case.eventually(eventually)
+    Replay.Live.close(live)
   end
 
   # Forwards and backwards, and at each place as it was on the way there.

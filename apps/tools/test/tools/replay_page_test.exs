@@ -66,6 +66,13 @@ defmodule Tools.ReplayPageTest do
                "return [...document.querySelectorAll('.run')].map((p) => p.textContent)"
              )
 
+    # What the robots said until then.
+    Browser.run(browser, "document.getElementById('tab-messages').click()")
+    Browser.await(browser, "return document.querySelectorAll('#said tr').length > 0")
+
+    assert Browser.run(browser, "return document.getElementById('said').innerText") =~
+             ", 3 robots: "
+
     # It plays to its end, and stands there.
     Browser.run(
       browser,

@@ -41,12 +41,21 @@ defmodule Console.Live.Fleet do
   def status(live, robot), do: live |> scene() |> Format.one(robot)
 
   @impl Console.Live
+  def statuses(live) do
+    living = Fleet.living(live)
+    for status <- Swarm.status(), status.robot in living, do: status
+  end
+
+  @impl Console.Live
   def about(live, robot), do: About.of(robot) || elsewhere(robot, Fleet.living(live))
+
+  @impl Console.Live
+  def messages(live), do: Fleet.messages(live)
 
   # A process of its own has its board there.
   defp elsewhere(robot, living) do
     with true <- robot in living, %Swarm.Status{} = status <- Swarm.status(robot) do
-      About.of_status(status)
+      status |> About.of_status() |> About.with_layer(Swarm.layer(robot))
     else
       _dead_or_unknown -> nil
     end

@@ -2,7 +2,8 @@ defmodule Console.Live.Mesh do
   @moduledoc """
   Shows the robots of the mesh that this node is part of, however they were started: what `bin/console` shows on its page.
 
-  It asks four times a second for their status, and commands them, by `Swarm` alone, as a person does in a shell. No robot
+  It asks four times a second for their status, and once a second for what the mission of a robot draws that a page shows, and
+  commands them, by `Swarm` alone, as a person does in a shell. No robot
   knows it: whether it hangs or dies changes nothing for them. Robots that come are shown by themselves, robots that have
   gone as no longer heard.
   """
@@ -14,6 +15,8 @@ defmodule Console.Live.Mesh do
   @behaviour Console.Live
 
   @period_ms 250
+  # A drawing may have 64 kB, and changes slowly.
+  @layer_ms 1_000
 
   @doc "Starts it. `connect` is the node that a person expects to hear, as text, `nil` for none in particular."
   @spec start_link(connect: String.t() | nil) :: GenServer.on_start()
@@ -48,13 +51,29 @@ defmodule Console.Live.Mesh do
   end
 
   @impl Console.Live
-  def status(live, :all), do: Enum.map(GenServer.call(live, :statuses), &inspect/1)
+  def statuses(live), do: GenServer.call(live, :statuses)
+
+  @impl Console.Live
+  def status(live, :all), do: Enum.map(statuses(live), &inspect/1)
   def status(live, robot), do: for(%Status{} = one <- [one(live, robot)], do: inspect(one))
 
   @impl Console.Live
-  def about(live, robot), do: with(%Status{} = one <- one(live, robot), do: About.of_status(one))
+  def about(live, robot) do
+    with %Status{} = status <- one(live, robot),
+         do: status |> About.of_status() |> About.with_layer(layer(live, status))
+  end
 
-  defp one(live, robot), do: Enum.find(GenServer.call(live, :statuses), &(&1.robot == robot))
+  # Only one that answers is asked, however many pages show it.
+  defp layer(live, %Status{from: :robot, robot: robot}), do: GenServer.call(live, {:layer, robot})
+  defp layer(_live, _row), do: {:ok, []}
+
+  @impl Console.Live
+  def messages(_live) do
+    {:error,
+     "what real robots say to each other goes from node to node, and not to this one; a recording has it: mix replay FILE --page"}
+  end
+
+  defp one(live, robot), do: Enum.find(statuses(live), &(&1.robot == robot))
 
   # In the caller's process, so that no robot that is slow to answer delays what is shown.
   @impl Console.Live
@@ -84,6 +103,7 @@ defmodule Console.Live.Mesh do
        view: View.new(),
        notice: Notice.new(connect),
        asked: nil,
+       layers: %{},
        ticker: Ticker.start(:tick, @period_ms, 0)
      }}
   end
@@ -96,6 +116,19 @@ defmodule Console.Live.Mesh do
 
   def handle_call(:notice, _from, s), do: {:reply, s.notice.line, s}
   def handle_call(:statuses, _from, s), do: {:reply, View.statuses(s.view), s}
+
+  # What the robot said last; it is asked again for the next time.
+  def handle_call({:layer, robot}, _from, s) do
+    now_ms = Hal.Clock.now_ms()
+    {layer, due_ms} = Map.get(s.layers, robot, {{:ok, []}, now_ms})
+
+    if now_ms < due_ms do
+      {:reply, layer, s}
+    else
+      _task = Task.async(fn -> {:layer, robot, Swarm.layer(robot)} end)
+      {:reply, layer, %{s | layers: Map.put(s.layers, robot, {layer, now_ms + @layer_ms})}}
+    end
+  end
 
   # An answer that takes longer than the period is waited for, and none is asked for twice.
   @impl GenServer
@@ -112,6 +145,13 @@ defmodule Console.Live.Mesh do
 
     {:noreply,
      %{s | asked: nil, view: view, notice: Notice.look(s.notice, seen(view), Hal.Clock.now_ms())}}
+  end
+
+  def handle_info({ref, {:layer, robot, layer}}, s) do
+    Process.demonitor(ref, [:flush])
+
+    {:noreply,
+     %{s | layers: Map.update!(s.layers, robot, fn {_old, due_ms} -> {layer, due_ms} end)}}
   end
 
   # What the mesh says of itself; `nil` for nodes where there is none.

@@ -12,7 +12,7 @@ defmodule Console.Live.Trial do
   alias Console.Pace
   alias Console.About
   alias Console.Prompt
-  alias Lab.{Recorder, Trial}
+  alias Lab.{Messages, Recorder, Trial}
   alias Swarm.Commands
   alias Swarm.MissionRegistry.Text
   @behaviour Console.Live
@@ -25,7 +25,7 @@ defmodule Console.Live.Trial do
   @spec start_link(module(), map(), Pace.t()) :: {:ok, pid()} | {:error, String.t()}
   def start_link(module, options, pace \\ Pace.new()) do
     with {:ok, setup} <- module.setup(options) do
-      trial = module.begin(setup, keep: @kept)
+      trial = module.begin(setup, record: true, keep: @kept)
       GenServer.start_link(__MODULE__, {module, trial, pace, nil})
     end
   end
@@ -79,6 +79,9 @@ defmodule Console.Live.Trial do
   @impl Console.Live
   def about(live, robot), do: GenServer.call(live, {:about, robot}, :infinity)
 
+  @impl Console.Live
+  def messages(live), do: {:ok, Messages.list(GenServer.call(live, :messages, :infinity))}
+
   @impl GenServer
   def init({module, trial, pace, recorder}) do
     Lab.Trial.Memory.prepare()
@@ -90,7 +93,8 @@ defmodule Console.Live.Trial do
       recorder: recorder,
       tick: 0,
       due_ms: Hal.Clock.now_ms(),
-      stopped_us: nil
+      stopped_us: nil,
+      messages: %Messages{}
     }
 
     {:ok, schedule(s, s.due_ms)}
@@ -106,6 +110,7 @@ defmodule Console.Live.Trial do
 
   def handle_call(:result, _from, state), do: {:reply, state.module.result(state.trial), state}
 
+  def handle_call(:messages, _from, state), do: {:reply, state.messages, state}
   def handle_call(:pace, _from, state), do: {:reply, state.pace, state}
 
   def handle_call({:command, {:pace, command}, _given_us}, _from, state) do
@@ -137,13 +142,20 @@ defmodule Console.Live.Trial do
 
   @impl GenServer
   def handle_info({:step, tick}, %{tick: tick} = state) do
-    trial = record(state.recorder, state.trial, state.module.step(state.trial))
-    state = %{state | trial: trial, pace: Pace.stepped(state.pace, Hal.Clock.now_ms())}
+    stepped = state.module.step(state.trial)
+    messages = Messages.note(state.messages, stepped.at_ms, sent(stepped))
+    trial = record(state.recorder, state.trial, stepped)
+    pace = Pace.stepped(state.pace, Hal.Clock.now_ms())
+    state = %{state | trial: trial, messages: messages, pace: pace}
     {:noreply, schedule(state, state.due_ms)}
   end
 
   def handle_info({:step, _former}, state), do: {:noreply, state}
 
+  defp sent(%Trial{entries: entries}), do: entries |> Enum.reverse() |> Messages.of_entries()
+  defp sent(_stand_in), do: []
+
+  defp record(nil, _before, %Trial{} = trial), do: trial |> Trial.take_entries() |> elem(1)
   defp record(nil, _before, trial), do: trial
 
   defp record({recorder, pictures}, before, trial),
@@ -203,8 +215,10 @@ defmodule Console.Live.Trial do
          do: tell(target, request, state)
   end
 
-  defp possible(command) when command in [:ping, :arm, :disarm, :acknowledge],
-    do: {:error, "in lockstep robots have no wheels to arm or disarm, and answer no ping"}
+  defp possible(command) when command in [:ping, :keep, :arm, :disarm, :acknowledge],
+    do:
+      {:error,
+       "in lockstep robots have no wheels to arm or disarm, answer no ping and keep nothing"}
 
   defp possible(_command), do: :ok
 

@@ -20,6 +20,7 @@ defmodule Console.Options.Page do
 
   @about %{
     foxglove: "serve Foxglove and Lichtblick at this port",
+    rmf: "serve Open-RMF's fleet adapter at this port, as its fleet manager",
     rosbridge: "serve programs for ROS at this port, as rosbridge does"
   }
 

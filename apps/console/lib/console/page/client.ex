@@ -1,12 +1,14 @@
 defmodule Console.Page.Client do
   @moduledoc false
-  # Tells the page of the robot that a person looks at there, five times a second.
+  # Tells the page of the robot that a person looks at there, five times a second, and of the messages between robots, twice a
+  # second where these are looked at.
   use GenServer
   alias Console.Page.{Feed, State}
   alias Console.About
 
   @about_ms 200
   @history_ms 500
+  @messages_ms 500
 
   @doc """
   Starts it for the connection of the caller, and linked to it: without one of them the other is of no use, and the page
@@ -18,6 +20,10 @@ defmodule Console.Page.Client do
   @doc "The robot that is looked at; `nil` for none."
   @spec look(pid(), atom() | nil) :: :ok
   def look(client, robot), do: GenServer.cast(client, {:look, robot})
+
+  @doc "Whether the messages between robots are looked at."
+  @spec messages(pid(), boolean()) :: :ok
+  def messages(client, on?), do: GenServer.cast(client, {:messages, on?})
 
   @impl GenServer
   def init({connection, feed, reply}) do
@@ -33,7 +39,8 @@ defmodule Console.Page.Client do
        live: live,
        reply: reply,
        looked: nil,
-       told: nil
+       told: nil,
+       messages: nil
      }}
   end
 
@@ -43,7 +50,22 @@ defmodule Console.Page.Client do
     {:noreply, %{s | looked: robot}}
   end
 
+  def handle_cast({:messages, on?}, s) do
+    if s.messages, do: Process.cancel_timer(s.messages.timer)
+    {:noreply, if(on?, do: said(s, nil), else: %{s | messages: nil})}
+  end
+
+  # Only what differs from what was told last.
+  defp said(s, told) do
+    said = s.module.messages(s.live)
+    if said != told, do: s.reply.(State.messages(said))
+    %{s | messages: %{told: said, timer: Process.send_after(self(), :messages, @messages_ms)}}
+  end
+
   @impl GenServer
+  def handle_info(:messages, %{messages: nil} = s), do: {:noreply, s}
+  def handle_info(:messages, s), do: {:noreply, said(s, s.messages.told)}
+
   def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
 
   def handle_info(:about, s) do

@@ -20,18 +20,18 @@ defmodule Console.Page.Http do
   ]
 
   @doc """
-  Whether a request may be answered; `page` has the door and what guards it (`t:Console.Page.Access.guard/0`), and `origin?`
-  says of which pages of others besides. The error is the status and one line.
+  Whether a request may be answered; `page` has the door and what guards it (`t:Console.Page.Access.guard/0`), `origin?`
+  says of which pages of others besides, and `methods` are those that are understood. The error is the status and one line.
   """
-  @spec admitted(request(), map(), origin? :: (String.t() -> boolean())) ::
+  @spec admitted(request(), map(), origin? :: (String.t() -> boolean()), methods :: [String.t()]) ::
           :ok | {status :: 400..499, line :: String.t()}
-  def admitted(request, page, origin? \\ fn _origin -> false end) do
+  def admitted(request, page, origin? \\ fn _origin -> false end, methods \\ ["GET"]) do
     asked = asked(request, page, origin?)
+    method = request |> get(:method) |> to_string()
 
-    case request |> get(:method) |> to_string() do
-      "GET" -> asked |> Page.Access.check(page) |> guessed(asked, page)
-      method -> {405, "#{method} is not understood here; GET is"}
-    end
+    if method in methods,
+      do: asked |> Page.Access.check(page) |> guessed(asked, page),
+      else: {405, "#{method} is not understood here; #{Enum.join(methods, " and ")} is"}
   end
 
   defp guessed(:guess, asked, page) do

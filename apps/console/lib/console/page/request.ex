@@ -1,6 +1,6 @@
 defmodule Console.Page.Request do
   @moduledoc false
-  # Answers the requests of browsers: the files of the page, and `/live`, a WebSocket on which the page gets the map and the
+  # Answers the requests of browsers: the files of the page, `/metrics` for Prometheus, and `/live`, a WebSocket on which the page gets the map and the
   # scenes as JSON and says its lines (`Console.Page.Line`). Runs in mochiweb's processes, one a connection.
   # Debian's package; without it there is no page.
   @compile {:no_warn_undefined, [:mochiweb_socket, :mochiweb_websocket]}
@@ -8,7 +8,7 @@ defmodule Console.Page.Request do
   alias Console.Page
   alias Console.Page.{Client, Door, Feed, Line, State}
   alias Console.About
-  alias Console.{Orders, Prompt}
+  alias Console.{Metrics, Orders, Prompt}
 
   @folder Path.expand("../../../priv/page", __DIR__)
   @types %{
@@ -49,6 +49,18 @@ defmodule Console.Page.Request do
     if header(request, "Sec-WebSocket-Key"),
       do: live(request, page),
       else: say(request, 426, "a WebSocket lives here")
+  end
+
+  defp serve("/metrics", request, page) do
+    {module, live} = page.page |> Feed.of() |> Feed.source()
+
+    if function_exported?(module, :statuses, 1) do
+      robots = page.robots.()
+      text = Metrics.text(robots, module.statuses(live), Metrics.node())
+      respond(request, 200, [{"Content-Type", Metrics.content_type()}], text)
+    else
+      say(request, 404, "metrics are of robots that are processes; a run in lockstep has none")
+    end
   end
 
   defp serve("/camera/" <> name, request, page) do
@@ -157,6 +169,7 @@ defmodule Console.Page.Request do
     case Line.order(line, given_us, s.robots.(), s.source) do
       {:ok, order} -> Orders.give(s.orders, %{order | given_us: given_us || heard_us})
       {:look, robot} -> Client.look(s.client, robot)
+      {:messages, on?} -> Client.messages(s.client, on?)
       error -> reply.(State.answer(line, error))
     end
   end

@@ -7,6 +7,9 @@ defmodule Console.Page.Service do
   """
   alias Console.Page
 
+  @doc "How its address begins: `ws` or `http`."
+  @callback scheme() :: String.t()
+
   @doc "What asks the fleet for its scenes; `module` and `live` as in `Console.Live`."
   @callback feed(%{module: module(), live: term(), robots: (... -> [atom()])}) ::
               Supervisor.child_spec()

@@ -110,6 +110,11 @@ defmodule Console.Page.State do
     Json.encode!(%{history | entries: entries} |> Map.put(:t, "history"))
   end
 
+  @doc "What robots have said to each other of late, or why that is not known (`c:Console.Live.messages/1`)."
+  @spec messages({:ok, [Lab.Messages.entry()]} | {:error, String.t()}) :: String.t()
+  def messages({:ok, entries}), do: Json.encode!(%{t: "messages", why: nil, entries: entries})
+  def messages({:error, line}), do: Json.encode!(%{t: "messages", why: line, entries: []})
+
   defp rounded(entry) do
     stages = Enum.map(entry.stages, &stage/1)
     error = with [_mean, _max] = error <- entry[:error], do: Enum.map(error, &round3/1)

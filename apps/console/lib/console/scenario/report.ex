@@ -25,8 +25,8 @@ defmodule Console.Scenario.Report do
   @doc """
   The line of an expectation: whether it held, when that was decided, and the figures.
 
-      iex> Console.Scenario.Report.verdict(%{expectation: {:formed, [by_s: 60.0]}, held?: false, at_s: 60.0, figures: "nobody leads"})
-      "   60.0 s  FAILED  {:formed, by_s: 60}: nobody leads"
+      iex> Console.Scenario.Report.verdict(%{expectation: {:formed, [by_s: 60.0]}, held?: false, at_s: 60.0, figures: "no robot leads"})
+      "   60.0 s  FAILED  {:formed, by_s: 60}: no robot leads"
   """
   @spec verdict(Check.verdict()) :: String.t()
   def verdict(verdict) do

@@ -115,7 +115,7 @@ defmodule Lab.Check.Bodies do
          else: (_does_not_see -> nil)
   end
 
-  defp off([]), do: "nobody has a slot"
+  defp off([]), do: "no robot has a slot"
 
   defp off(errors) do
     Enum.map_join(errors, ", ", fn

@@ -94,12 +94,12 @@ defmodule Lab.Check.Fleet do
   defp formation(false, moment),
     do: "not in formation: #{leader(moment)}; #{phases(moment, Moment.who(moment, :all))}"
 
-  defp leader(moment), do: "#{RunLog.leader(moment.run_log) || "nobody"} leads"
+  defp leader(moment), do: "#{RunLog.leader(moment.run_log) || "no robot"} leads"
 
-  defp leads({part, []}), do: "nobody leads #{Enum.join(part, ", ")}"
+  defp leads({part, []}), do: "no robot leads #{Enum.join(part, ", ")}"
   defp leads({part, leaders}), do: "#{Enum.join(leaders, " and ")} lead #{Enum.join(part, ", ")}"
 
-  defp names({id, nil, epoch}), do: "#{id} follows nobody (epoch #{epoch || 0})"
+  defp names({id, nil, epoch}), do: "#{id} follows no robot (epoch #{epoch || 0})"
   defp names({id, leader, epoch}), do: "#{id} names #{leader} (epoch #{epoch})"
 
   defp all(moment, who, so?) do

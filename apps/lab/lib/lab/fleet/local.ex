@@ -35,7 +35,7 @@ defmodule Lab.Fleet.Local do
     name = make_ref()
     {:ok, supervisor} = Supervisor.start_link(parts(setup, name, folder), parts_options())
     part = fn id -> supervisor |> Supervisor.which_children() |> List.keyfind(id, 0) |> pid() end
-    {transport, air} = RadioServer.radio(part.(RadioServer))
+    {transport, air} = RadioServer.radio(part.(RadioServer), self())
     :ok = Event.attach({__MODULE__, self()}, [:robot, :stage], &__MODULE__.stage/4, self())
 
     common = %{
@@ -110,7 +110,7 @@ defmodule Lab.Fleet.Local do
 
   # Its recorder may be that of others, too.
   def suffer(backend, {:freeze, id, for_s}),
-    do: suspend(backend, id, List.delete(Names.roles(id), :recorder), for_s)
+    do: suspend(backend, id, Names.roles(id) -- [:recorder, :incidents], for_s)
 
   # They get no processor, as if the system had none for them. They go on when the process that holds them ends, with the fleet
   # at the latest.

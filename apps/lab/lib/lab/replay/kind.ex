@@ -70,6 +70,9 @@ defmodule Lab.Replay.Kind do
   @doc "What a tick's entries say to people."
   @callback facts(t(), tick()) :: Recording.Facts.t()
 
+  @doc "What robots said to each other in a tick, as far as it was recorded."
+  @callback messages(t(), tick()) :: [Lab.Messages.sent()]
+
   @doc false
   def step(%kind{} = replay, tick), do: kind.step(replay, tick)
   @doc false
@@ -88,4 +91,6 @@ defmodule Lab.Replay.Kind do
   def compared(%kind{} = replay), do: kind.compared(replay)
   @doc false
   def facts(%kind{} = replay, tick), do: kind.facts(replay, tick)
+  @doc false
+  def messages(%kind{} = replay, tick), do: kind.messages(replay, tick)
 end

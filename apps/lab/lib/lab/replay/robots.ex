@@ -7,6 +7,7 @@ defmodule Lab.Replay.Robots do
   Leader, epoch, `formed` and stages are judged from the missions' claims, as for a live fleet (`Lab.Fleet`).
   """
   @behaviour Lab.Replay.Kind
+  alias Robot.Mission.{Claim, Letter, Runner}
   alias Robot.Percept
   alias Record.Recording
   alias Record.Recording.Topics
@@ -17,6 +18,8 @@ defmodule Lab.Replay.Robots do
 
   # A robot of which nothing was recorded for so long is not counted among the living.
   @silent_ms 1_000
+  # What is ahead of a leader changes the places in a shape, and not the shape.
+  @ahead_m 1.0
   @new %{pose: nil, radius: nil, uncertainty: nil, driving: nil, claim: %{}, mission: nil}
 
   @enforce_keys [:shifts, :only]
@@ -139,17 +142,39 @@ defmodule Lab.Replay.Robots do
   @impl Lab.Replay.Kind
   def scene(%__MODULE__{run_log: run_log} = replay) do
     robots = for {id, %{pose: %Hal.Pose{}} = robot} <- replay.robots, do: seen(replay, id, robot)
+    robots = Enum.sort_by(robots, & &1.id)
+    leader = RunLog.leader(run_log)
 
     %Scene{
       at_ms: replay.at_ms,
       map: nil,
-      robots: Enum.sort_by(robots, & &1.id),
-      leader: RunLog.leader(run_log),
+      robots: robots,
+      layer: Evaluation.layer([leader | Enum.map(robots, & &1.id)], &layer(replay, &1)),
+      leader: leader,
+      formation: formation(replay, leader),
       epoch: run_log.epoch,
       formed?: RunLog.formed?(run_log),
       estop: run_log.estop,
       stages: RunLog.stages(run_log)
     }
+  end
+
+  @doc "What the mission of a robot draws now (`c:Robot.Mission.layer/1`), as far as it decides again here."
+  @spec layer(t(), robot :: atom() | nil) :: Robot.Mission.layer()
+  def layer(%__MODULE__{replay: replay}, id) do
+    case Record.Replay.state(replay, id, :pilot) do
+      %{runner: runner} -> Runner.layer(runner)
+      nil -> []
+    end
+  end
+
+  # As its leader means it.
+  defp formation(replay, leader) do
+    with %{mission: mission, pose: %Hal.Pose{} = pose, claim: claim} when mission != nil <-
+           replay.robots[leader],
+         %{formation: formation} <- Robot.Mission.shape(mission, claim, pose, @ahead_m),
+         do: formation,
+         else: (_leads_none -> nil)
   end
 
   defp seen(replay, id, robot) do
@@ -205,5 +230,12 @@ defmodule Lab.Replay.Robots do
           do: {id, to, Topics.kind(message), nil}
 
     %{sent: sent, speeds: speeds, seen: []}
+  end
+
+  @impl Lab.Replay.Kind
+  def messages(%__MODULE__{}, {_at_ms, entries}) do
+    for {id, {:pilot, :effect, {:send, to, %type{} = message}, _at_ms}} <- entries,
+        type in [Swarm.Message, Letter, Claim],
+        do: {id, to, Swarm.Message.of(id, message)}
   end
 end

@@ -78,7 +78,7 @@ defmodule Lab.Scenario.Runner do
       iex> {:ok, scenario} = Lab.Scenario.new(options: [robots: 1, duration_s: 1], expect: [{:never, :collision}, {:formed, by_s: 0.5}])
       iex> {:ok, result, [safe, formed]} = Lab.Scenario.Runner.run(scenario)
       iex> {result.simulated_s, safe.held?, formed.held?, formed.at_s, formed.figures}
-      {1.0, true, false, 0.5, "not in formation: nobody leads; mag1 search"}
+      {1.0, true, false, 0.5, "not in formation: no robot leads; mag1 search"}
   """
   @spec run(Scenario.t()) ::
           {:ok, result :: map(), [Check.verdict()]} | {:error, line :: String.t()}

@@ -43,6 +43,8 @@ defmodule Lab.Trial.Evaluation do
           says: claim[:says],
           crashed: claim[:crashed],
           arming: claim[:arming],
+          fault: claim[:fault],
+          offline: claim[:offline] || [],
           size_ppm: account.sight && account.sight.size_ppm
         }
       end
@@ -53,7 +55,7 @@ defmodule Lab.Trial.Evaluation do
       landmark: run.world.landmark,
       robots: robots,
       mission: most(for {_id, %{mission: module}} <- Enum.sort(run.claims), do: module),
-      layer: layer(run, leader),
+      layer: layer([leader | run.options.robots], &run.claims[&1][:layer]),
       leader: leader,
       epoch: run.run_log.epoch,
       formation: shape.formation,
@@ -64,10 +66,11 @@ defmodule Lab.Trial.Evaluation do
     }
   end
 
-  # What the mission of its leader draws, or that of the first robot whose mission draws something.
-  defp layer(run, leader) do
-    Enum.find_value([leader | run.options.robots], [], fn id ->
-      with [_ | _] = layer <- run.claims[id][:layer], do: layer, else: (_nothing -> nil)
+  @doc "What the mission of the first of these robots draws that draws something; `drawn` says what one draws, if anything."
+  @spec layer([atom()], (atom() -> Robot.Mission.layer() | nil)) :: Robot.Mission.layer()
+  def layer(robots, drawn) do
+    Enum.find_value(robots, [], fn id ->
+      with [_ | _] = layer <- drawn.(id), do: layer, else: (_nothing -> nil)
     end)
   end
 

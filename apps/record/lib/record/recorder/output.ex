@@ -6,6 +6,9 @@ defmodule Record.Recorder.Output do
   alias Record.{Recording, Replay}
   alias Record.Recording.Topics
 
+  # Two readings of a clock that stands still by the other one.
+  @same_ms 100
+
   @enforce_keys [:writer, :keys, :topics]
   defstruct @enforce_keys ++
               [channels: %{}, file: nil, names: MapSet.new(), said: nil, question: nil]
@@ -138,6 +141,17 @@ defmodule Record.Recorder.Output do
 
   defp message(output, key, ns, data),
     do: FileWriter.message(output.writer, Map.fetch!(output.channels, key), ns, data)
+
+  @doc "What is known of robots after a state of one: it tells the body, and the time at which it was sent the offset of the robot's clock."
+  @spec know(Recording.robots(), atom(), state :: struct(), offset_ms :: integer()) ::
+          Recording.robots()
+  def know(robots, id, state, offset_ms) do
+    robot = robots[id]
+    profile = robot.profile || Map.get(state, :profile)
+    known? = robot.offset_ms != nil and abs(robot.offset_ms - offset_ms) < @same_ms
+    offset_ms = if known?, do: robot.offset_ms, else: offset_ms
+    Map.put(robots, id, %{offset_ms: offset_ms, profile: profile})
+  end
 
   @doc "Ends the file."
   @spec close(t()) :: :ok | {:error, line :: String.t()}

@@ -28,6 +28,8 @@ defmodule Robot.Devices.Log do
     [:vision, :saver, :healed],
     [:robot, :recorder, :failed],
     [:robot, :recorder, :healed],
+    [:robot, :incident, :kept],
+    [:robot, :incident, :failed],
     [:swarm, :comms, :duplicate_id],
     [:swarm, :comms, :unique_id],
     [:swarm, :comms, :joystick]
@@ -120,6 +122,12 @@ defmodule Robot.Devices.Log do
     {:warning,
      "#{robot}: its #{role} was sent what it does not know; so far it has dropped #{count} messages"}
   end
+
+  def line(:kept, %{file: file, why: why}),
+    do: {:info, "the last minute is in #{file}: #{Enum.join(why, "; ")}"}
+
+  def line(:failed, %{line: line, why: why}),
+    do: {:warning, "the last minute could not be kept (#{Enum.join(why, "; ")}): #{line}"}
 
   def line(:failed, %{robots: [robot | _], line: line}),
     do: {:warning, "#{robot}: nothing can be recorded: #{line}"}

@@ -1,5 +1,5 @@
 defmodule Robot.File.RecordOptions do
-  @moduledoc "Lists the options of a robot's recorder: `record:` of its file."
+  @moduledoc "Lists the options of what records a robot: `record:` and `incidents:` of its file."
   alias Hal.Options
 
   @table [
@@ -8,9 +8,23 @@ defmodule Robot.File.RecordOptions do
     pictures: [{:or, nil, {:number, 0.1, 5, "pictures a second"}}, default: nil]
   ]
 
-  @doc "The table of the options."
+  @incidents [
+    folder: [{:path, "the path of a folder"}, required: true],
+    limit_mb: [{:integer, 4, 1_000_000, "MB"}, default: 100],
+    seconds: [{:integer, 10, 300, "s"}, default: 60]
+  ]
+
+  @doc "The table of the options of `record:`."
   @spec table() :: Options.table()
   def table, do: @table
+
+  @doc "The table of the options of `incidents:`."
+  @spec incidents() :: Options.table()
+  def incidents, do: @incidents
+
+  @doc "Checks the options of `incidents:` and adds the defaults; the error says what is wrong."
+  @spec check_incidents(term()) :: {:ok, keyword()} | {:error, line :: String.t()}
+  def check_incidents(options), do: Options.check(options, @incidents, "incidents")
 
   @doc """
   Checks the options and adds the defaults; the error says what is wrong.

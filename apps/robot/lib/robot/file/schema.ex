@@ -55,6 +55,7 @@ defmodule Robot.File.Schema do
      estop_file: {:or, nil, {:path, "the path of a file"}},
      console: {:or, nil, {:keys, Keyword.take(PowerSwitch.table(), [:port, :speed, :phrase])}},
      record: {:or, nil, {:keys, RecordOptions.table()}},
+     incidents: {:or, nil, {:keys, RecordOptions.incidents()}},
      network: extension(:network, context.tables),
      policies: extension(:policies, context.tables)}
   end

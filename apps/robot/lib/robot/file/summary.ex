@@ -27,7 +27,10 @@ defmodule Robot.File.Summary do
         there? \\ &File.exists?/1,
         writable? \\ &RecordOptions.writable?/1
       ) do
-    odd = Warnings.lines(robot, there?, &kind/1) ++ unwritable(robot.record, writable?)
+    odd =
+      Warnings.lines(robot, there?, &kind/1) ++
+        unwritable(:record, robot.record, writable?) ++
+        unwritable(:incidents, robot.incidents, writable?)
 
     title =
       case length(odd) do
@@ -87,6 +90,7 @@ defmodule Robot.File.Summary do
         "looks for": colours(robot.colours),
         keeps: pictures(robot.save_pictures),
         records: recording(robot.record),
+        keeps: incidents(robot.incidents),
         starts: start(robot.start),
         knows: map(robot.map),
         arms: arms(robot),
@@ -158,15 +162,23 @@ defmodule Robot.File.Summary do
     "the newest #{all[:limit_mb]} MB in #{all[:folder]}, for mix replay#{pictures}"
   end
 
-  defp unwritable(nil, _writable?), do: []
+  defp incidents(nil), do: nil
 
-  defp unwritable(options, writable?) do
+  defp incidents(options) do
+    {:ok, all} = RecordOptions.check_incidents(options)
+
+    "the last #{all[:seconds]} s before an incident, the newest #{all[:limit_mb]} MB in #{all[:folder]}"
+  end
+
+  defp unwritable(_key, nil, _writable?), do: []
+
+  defp unwritable(key, options, writable?) do
     folder = options[:folder]
 
     if writable?.(folder),
       do: [],
       else: [
-        "record.folder: #{folder} cannot be written on this machine; it must be on the robot's, " <>
+        "#{key}.folder: #{folder} cannot be written on this machine; it must be on the robot's, " <>
           "or the folder that it is in"
       ]
   end

@@ -182,6 +182,10 @@ defmodule Robot.Safety.Reflex do
   def forget(%__MODULE__{} = reflex),
     do: {%{reflex | wish: nil, wish_at_ms: nil}, if(moving?(reflex), do: :now, else: :later)}
 
+  @doc "The limits that set the speed to zero without a ramp."
+  @spec stops() :: [limit(), ...]
+  def stops, do: @stops
+
   @doc """
   Takes a reading; readings that no limit needs are ignored. While the robot moves, a touched
   bumper, a sonar reading, a scan and a reading of arming ask for a step `:now`. A reading that is not

@@ -11,7 +11,9 @@ defmodule Swarm.Comms.CommandHandler do
   |---|---|
   | `:status` | `Swarm.Status` |
   | `:ping` | `{:ok, line}`: name, uptime and state (`Swarm.Comms.PingReply`) |
+  | `:keep` | `{:ok, line}`: its last minute is written as a recording; or that it keeps none |
   | `:sonar` | `{:ok, [{where, metres}]}`: what its sonars measured last, or why that is not known |
+  | `:layer` | `{:ok, layer}`: what its mission draws over the map (`t:Robot.Mission.layer/0`), or that it is too much |
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
   | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.MissionRegistry`) |
   | `{:formation, kind, spacing}` | for the running mission |
@@ -42,6 +44,8 @@ defmodule Swarm.Comms.CommandHandler do
   @carry_out_ms 400
   # Readings that are older tell nothing of now.
   @recent_ms 1_000
+  # Some 3,000 places of what a mission draws.
+  @most_drawn_bytes 65_536
   # The drive may begin at the last moment, and takes some time.
   @drive_ms 50
 
@@ -64,6 +68,9 @@ defmodule Swarm.Comms.CommandHandler do
       :present ->
         [{:cast, :gate, {:present, div(now_us - asked_us, 1_000)}}, {:reply, ref, :ok}]
 
+      :keep ->
+        [{:cast, :incidents, {:keep, config.id, ref}}]
+
       {:drive, order} ->
         drive(order, config.id, ref, {asked_us, now_us})
 
@@ -77,13 +84,19 @@ defmodule Swarm.Comms.CommandHandler do
 
   # A robot in lockstep has no such words.
   defp judge(question, %{id: id}, %{} = board, _heard)
-       when question in [:status, :ping, :sonar] and not is_struct(board),
+       when question in [:status, :ping, :keep, :sonar, :layer] and not is_struct(board),
        do: {:error, "#{id} answers no #{question} in lockstep"}
 
   defp judge(:status, config, board, {receiver, _at_ms}), do: Status.of(config, board, receiver)
 
   defp judge(:ping, config, board, {receiver, _at_ms}),
     do: {:ok, PingReply.line(config, board, Status.of(config, board, receiver))}
+
+  defp judge(:keep, %{id: id}, _board, _heard) do
+    if Names.whereis(id, :incidents),
+      do: :keep,
+      else: {:error, "#{id} does not keep its last minute: its file has no incidents:"}
+  end
 
   defp judge(:sonar, config, board, {_receiver, at_ms}) do
     recent = fn key, _limit_ms -> Board.fetch(board, key, @recent_ms, at_ms) end
@@ -96,6 +109,17 @@ defmodule Swarm.Comms.CommandHandler do
         {:ok,
          for({_pose, range} = heard <- Enum.zip(body.sonars, ranges), range != nil, do: heard)}
     end
+  end
+
+  defp judge(:layer, config, board, _heard) do
+    layer =
+      with {:ok, %{layer: layer}, _at_ms} <- Board.fetch(board, :mission, :infinity, 0),
+           do: layer,
+           else: (_idle -> [])
+
+    if :erlang.external_size(layer) <= @most_drawn_bytes,
+      do: {:ok, layer},
+      else: {:error, "#{config.id}: its mission draws too much to be sent"}
   end
 
   defp judge(:present, _config, _board, _heard), do: :present

@@ -159,7 +159,9 @@ defmodule Swarm.Host.ReleaseBoot do
     with %{"RELEASE_ROOT" => root, "RELEASE_VSN" => version} <- environment,
          {:ok, [settings]} <- :file.consult(Path.join([root, "releases", version, "sys.config"])) do
       words =
-        settings |> Keyword.get(:swarm, []) |> Keyword.take([:missions, :formations, :recorder])
+        settings
+        |> Keyword.get(:swarm, [])
+        |> Keyword.take([:missions, :formations, :recorder, :incidents])
 
       Application.put_all_env(swarm: words)
     end

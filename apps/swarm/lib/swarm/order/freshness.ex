@@ -66,7 +66,9 @@ defmodule Swarm.Order.Freshness do
   """
   @spec needed?(request :: term()) :: boolean()
   def needed?({:estop, _call}), do: false
-  def needed?(request), do: request not in [:stop, :disarm, :estop, :status, :ping, :sonar]
+
+  def needed?(request),
+    do: request not in [:stop, :disarm, :estop, :status, :ping, :keep, :sonar, :layer]
 
   @doc "Whether a term from outside can be a stamp."
   @spec stamp?(term()) :: boolean()

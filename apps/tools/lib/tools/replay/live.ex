@@ -10,6 +10,7 @@ defmodule Tools.Replay.Live do
   alias Console.{About, Pace}
   alias Console.Cli.Format
   alias Hal.Clock
+  alias Lab.Messages
   alias Lab.Replay.{Cursor, Kind}
   alias Sim.Scene
   alias Tools.Replay.{Command, Guard, Moment, Options, Recording, Verdict}
@@ -20,8 +21,10 @@ defmodule Tools.Replay.Live do
   # The scout rests after so long, so that questions are answered.
   @part_ms 40
   @wait_ms 50
+  # Of so long before the time that is shown messages are told.
+  @said_ms 20_000
 
-  @enforce_keys [:names, :runs, :last_ms, :tracks, :due_ms]
+  @enforce_keys [:recording, :names, :runs, :last_ms, :tracks, :due_ms]
   defstruct @enforce_keys ++
               [
                 pace: Pace.new(),
@@ -30,7 +33,8 @@ defmodule Tools.Replay.Live do
                 told: 0,
                 differs?: false,
                 tick: 0,
-                about: nil
+                about: nil,
+                messages: nil
               ]
 
   @typedoc """
@@ -51,6 +55,7 @@ defmodule Tools.Replay.Live do
     {:ok, paused} = Pace.command(Pace.new(), :pause)
 
     %__MODULE__{
+      recording: recording,
       names: Recording.names(recording),
       runs: Enum.map(recordings, &Path.basename(&1.file.path)),
       last_ms: recordings |> Enum.map(&Recording.last_ms/1) |> Enum.max(),
@@ -104,6 +109,9 @@ defmodule Tools.Replay.Live do
 
   @impl Console.Live
   def history(live, after_count), do: GenServer.call(live, {:history, after_count}, :infinity)
+
+  @impl Console.Live
+  def messages(live), do: {:ok, GenServer.call(live, :messages, :infinity)}
 
   @impl Console.Live
   def about(live, robot), do: GenServer.call(live, {:about, robot}, :infinity)
@@ -176,11 +184,36 @@ defmodule Tools.Replay.Live do
     {about, %{state | about: {here.number, robot, about}}}
   end
 
+  # Of one place the same for all that look.
+  defp reply(:messages, state) do
+    here = here(state)
+
+    case state.messages do
+      {number, messages} when number == here.number -> {messages, state}
+      _elsewhere -> said(here, state)
+    end
+  end
+
   defp reply({:answer, text}, state) do
     case word(text, state) do
       {:ok, said, state} -> {{:ok, said}, state}
       {:error, line} -> {{:error, line}, state}
     end
+  end
+
+  defp said(here, state) do
+    to_ms = Kind.at_ms(here.replay)
+
+    messages =
+      state.recording
+      |> Recording.ticks(max(to_ms - @said_ms, 0))
+      |> Stream.take_while(fn {at_ms, _entries} -> at_ms <= to_ms end)
+      |> Enum.reduce(%Messages{}, fn {at_ms, _entries} = tick, messages ->
+        Messages.note(messages, at_ms, Kind.messages(here.replay, tick))
+      end)
+      |> Messages.list()
+
+    {messages, %{state | messages: {here.number, messages}}}
   end
 
   # Only a run in lockstep has members; of robots of processes their reasons are known.
@@ -191,7 +224,8 @@ defmodule Tools.Replay.Live do
          else: (_dead_or_nothing_yet -> About.nothing())
   end
 
-  defp about_of(_robots, _robot), do: About.nothing()
+  defp about_of(%Lab.Replay.Robots{} = replay, robot),
+    do: About.with_layer(About.nothing(), {:ok, Lab.Replay.Robots.layer(replay, robot)})
 
   defp why(name, here, state), do: Moment.lines(%Options{why: name}, here, state.names)
 

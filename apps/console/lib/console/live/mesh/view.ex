@@ -153,12 +153,20 @@ defmodule Console.Live.Mesh.View do
       at_ms: at_ms,
       map: nil,
       robots: robots,
+      mission: mission(view),
       leader: leader && leader.id,
       epoch: leader && view.statuses[leader.id].epoch,
-      formation: nil,
+      formation: leader && view.statuses[leader.id].formation,
       estop: view.estop,
       stages: view.stages
     }
+  end
+
+  # What most of those do that are on a mission.
+  defp mission(view) do
+    names = for %{mission: name} when name != nil <- statuses(view), do: name
+    counts = Enum.frequencies(names)
+    Enum.max_by(names, &counts[&1], fn -> nil end)
   end
 
   defp robot(status, gone?, {frame, apart}) do
