@@ -385,6 +385,16 @@ defmodule Swarm do
   @spec given(at_us :: integer(), (... -> result)) :: result when result: term()
   defdelegate given(at_us, fun), to: Commands.Client
 
+  @doc """
+  Calls a function whose orders are given by `giver`, as people name it, and returns what it returns. The robots log and
+  record who gave an order. A giver is a text of at most 60 printable bytes (ASCII); anything else is left out, and the order is
+  given by this node, as without this call.
+
+      Swarm.by("page 127.0.0.1:5123", fn -> Swarm.goto(:mag1, {2.0, 1.0}) end)
+  """
+  @spec by(giver :: String.t(), (... -> result)) :: result when result: term()
+  defdelegate by(giver, fun), to: Commands.Client
+
   @doc false
   @spec ask(atom(), term()) :: term()
   def ask(robot, request), do: Commands.Client.ask([robot], request)[robot]

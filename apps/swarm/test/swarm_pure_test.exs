@@ -15,4 +15,5 @@ defmodule SwarmPureTest do
   doctest Swarm.Message.Words
   doctest Swarm.Membership.Heartbeat
   doctest Swarm.Order
+  doctest Swarm.Order.Giver
 end

@@ -75,7 +75,8 @@ defmodule Bridge.Connection do
     me = self()
     hub = Hub.of(page.page)
     {source, channels} = Hub.join(hub)
-    {:ok, orders} = Orders.start_link(&send(me, {:answer, &1, &2}))
+    who = "#{name} #{peer(socket)}"
+    {:ok, orders} = Orders.start_link(who, &send(me, {:answer, &1, &2}))
     _writer = spawn_link(fn -> write(hub, me, socket, dialect) end)
     {state, effects} = dialect.new(channels)
 
@@ -83,7 +84,7 @@ defmodule Bridge.Connection do
       socket: socket,
       page: page,
       dialect: dialect,
-      who: "#{name} #{peer(socket)}",
+      who: who,
       hub: hub,
       source: source,
       orders: orders,
@@ -95,13 +96,6 @@ defmodule Bridge.Connection do
     }
 
     s |> effects(effects) |> loop()
-  end
-
-  defp peer(socket) do
-    case :inet.peername(socket) do
-      {:ok, {address, port}} -> "#{:inet.ntoa(address)}:#{port}"
-      {:error, _gone} -> "?"
-    end
   end
 
   # Ends with the connection, and the connection with the hub.

@@ -157,7 +157,7 @@ defmodule Bridge.Rmf do
     answer =
       with {:ok, order} <-
              Line.order(line, given_us, asked.robots, Manager.source(asked.manager)),
-           do: order.run.(0)
+           do: Swarm.by(asked.who, fn -> order.run.(0) end)
 
     {told, text} = answer
     text = text |> List.wrap() |> Enum.join("; ")

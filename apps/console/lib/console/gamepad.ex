@@ -51,7 +51,7 @@ defmodule Console.Gamepad do
     cat = System.find_executable("cat")
     port = Port.open({:spawn_executable, cat}, [:binary, :exit_status, args: [options.path]])
     me = self()
-    {:ok, orders} = Orders.start_link(&send(me, {:answered, &1, &2}))
+    {:ok, orders} = Orders.start_link("gamepad of #{node()}", &send(me, {:answered, &1, &2}))
     own = %{port: port, orders: orders, pad: %Joystick{}, driving?: false, refused: nil}
     {:ok, Map.merge(options, own)}
   end

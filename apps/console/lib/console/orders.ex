@@ -35,9 +35,12 @@ defmodule Console.Orders do
         }
   @type answer :: {:ok, String.t() | [String.t()]} | {:error, String.t()}
 
-  @doc "Starts it, linked to the caller; `answer` is called with the line of each order and its answer."
-  @spec start_link((String.t(), answer() -> term())) :: {:ok, pid()}
-  def start_link(answer), do: GenServer.start_link(__MODULE__, answer)
+  @doc """
+  Starts it, linked to the caller, for the orders of this giver (`Swarm.by/2`); `answer` is called with the line of each order and
+  its answer.
+  """
+  @spec start_link(giver :: String.t(), (String.t(), answer() -> term())) :: {:ok, pid()}
+  def start_link(giver, answer), do: GenServer.start_link(__MODULE__, {giver, answer})
 
   @doc "Gives an order. It waits for nothing."
   @spec give(pid(), order()) :: :ok
@@ -90,8 +93,9 @@ defmodule Console.Orders do
   def stopped, do: {:error, "not carried out: stopped before its turn came"}
 
   @impl GenServer
-  def init(answer),
-    do: {:ok, %{answer: answer, waiting: [], running: nil, stops: %{}, settling: []}}
+  def init({giver, answer}) do
+    {:ok, %{giver: giver, answer: answer, waiting: [], running: nil, stops: %{}, settling: []}}
+  end
 
   @impl GenServer
   def handle_cast({:give, %{kind: :stop} = stop}, s) do
@@ -103,7 +107,7 @@ defmodule Console.Orders do
 
     # The one under way may have reached some robots before others have moved.
     case Enum.find(s.stops, fn {_ref, {under_way, _next}} -> under_way.key == stop.key end) do
-      nil -> {:noreply, put_in(s.stops[begin(stop)], {stop, nil})}
+      nil -> {:noreply, put_in(s.stops[begin(s, stop)], {stop, nil})}
       {ref, {under_way, _next}} -> {:noreply, put_in(s.stops[ref], {under_way, stop})}
     end
   end
@@ -111,7 +115,7 @@ defmodule Console.Orders do
   def handle_cast({:give, %{kind: :present} = word}, s) do
     if Enum.any?(s.stops, &match?({_ref, {%{kind: :present}, _again}}, &1)),
       do: {:noreply, s},
-      else: {:noreply, put_in(s.stops[begin(word)], {word, nil})}
+      else: {:noreply, put_in(s.stops[begin(s, word)], {word, nil})}
   end
 
   def handle_cast({:give, order}, s), do: {:noreply, next(%{s | waiting: wait(s, order)})}
@@ -135,7 +139,7 @@ defmodule Console.Orders do
     told(s, stop, answer)
 
     if again,
-      do: put_in(%{s | stops: stops}.stops[begin(again)], {again, nil}),
+      do: put_in(%{s | stops: stops}.stops[begin(s, again)], {again, nil}),
       else: %{s | stops: stops}
   end
 
@@ -160,7 +164,7 @@ defmodule Console.Orders do
   defp next(order, s) do
     case timely(order, age_ms(order)) do
       :ok ->
-        %{s | running: {begin(order), order}}
+        %{s | running: {begin(s, order), order}}
 
       late ->
         told(s, order, late)
@@ -172,9 +176,10 @@ defmodule Console.Orders do
   defp timely(%{kind: {:word, _robot, longest_ms}}, age_ms) when age_ms >= longest_ms, do: :late
   defp timely(_order, _age_ms), do: :ok
 
-  defp begin(order) do
+  defp begin(s, order) do
     age_ms = age_ms(order)
-    Task.async(fn -> Swarm.given(order.given_us, fn -> order.run.(age_ms) end) end).ref
+    run = fn -> Swarm.by(s.giver, fn -> order.run.(age_ms) end) end
+    Task.async(fn -> Swarm.given(order.given_us, run) end).ref
   end
 
   defp age_ms(%{given_us: given_us}),

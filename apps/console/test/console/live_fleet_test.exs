@@ -89,7 +89,7 @@ defmodule Console.LiveFleetTest do
     {:ok, live} = Live.Fleet.start_link(Map.put(options, :mission, false))
     Swarm.Case.eventually(fn -> Swarm.Directory.robots() == [:mag62, :min62] end)
     test = self()
-    {:ok, orders} = Orders.start_link(&send(test, {:answer, &1, &2}))
+    {:ok, orders} = Orders.start_link("a test", &send(test, {:answer, &1, &2}))
 
     # All at once, and on a millisecond, of which the time for an answer is counted: on a busy machine, too, the first
     # takes all of it.

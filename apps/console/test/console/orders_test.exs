@@ -26,7 +26,7 @@ defmodule Console.OrdersTest do
 
   defp orders do
     test = self()
-    {:ok, orders} = Orders.start_link(&send(test, {:answer, &1, &2}))
+    {:ok, orders} = Orders.start_link("a test", &send(test, {:answer, &1, &2}))
     orders
   end
 

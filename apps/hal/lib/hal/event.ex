@@ -48,6 +48,7 @@ defmodule Hal.Event do
   | `[:swarm, :part, :fell]` | `at_ms` | `id`, `reason`: a part of the node crashed; it is restarted |
   | `[:swarm, :comms, :duplicate_id]` | | `robot`, `other`: another robot of this name was there first; this one stays silent |
   | `[:swarm, :comms, :unique_id]` | | `robot`: the other one has not been heard for 10 s; this one speaks again |
+  | `[:swarm, :comms, :ordered]` | | `robot`, `order` (in words), `by` (its giver): a person's order that the robot obeys; of words of driving the first |
   | `[:swarm, :comms, :joystick]` | | `robot`, `line`: why it does not drive by its own joystick |
   | `[:mesh, :up]`, `[:mesh, :suspect]`, `[:mesh, :gone]` | `at_ms` | `node`, judged by its datagrams |
   | `[:mesh, :connected]`, `[:mesh, :disconnected]` | `at_ms` | `node`, by Erlang's distribution |

@@ -16,7 +16,7 @@ defmodule Swarm.Comms do
   |---|---|
   | `{:hear, term}` | another robot, by any transport |
   | `{:say, to, message}` | the mission: for a robot, several, or `:all` |
-  | `{:command, request, ref, order}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) |
+  | `{:command, request, ref, order, giver}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) and its giver (`Swarm.Order.Giver`) |
   | `{:stamp, ref}` | a sender on another node that will send an order |
   | `{:result, {:delivered, command, ref}, outcome}` | pilot or executive, which an order has reached |
   | `{:rival, identity, comms}` | another robot of this name |
@@ -31,12 +31,12 @@ defmodule Swarm.Comms do
   """
   alias Robot.{Board, Host, Names, Role}
   alias Robot.Mission.{Claim, Letter}
-  alias Swarm.{Blackboard, Directory, EStop, Message, Replacement, Transport, Wire}
+  alias Swarm.{Blackboard, Directory, EStop, Message, Order, Replacement, Transport, Wire}
   alias Swarm.Comms.{CommandHandler, Joystick, NameClaim, OwnHeartbeat}
   alias Swarm.Discovery.RobotInfo
   alias Swarm.Membership.{Heartbeat, Peers}
   alias Swarm.Message.{Checked, Receiver}
-  alias Swarm.Order.Freshness
+  alias Swarm.Order.{Freshness, Giver}
 
   @behaviour Robot.Companion
   @behaviour Robot.Role
@@ -44,6 +44,8 @@ defmodule Swarm.Comms do
   @tick_ms 100
   @rivals_every 10
   @urgent_ticks 10
+  # Words of driving after a longer pause are told again.
+  @pause_ms 2_000
 
   @enforce_keys [:config, :receiver, :name, :held]
   defstruct @enforce_keys ++
@@ -55,13 +57,14 @@ defmodule Swarm.Comms do
                 beat_ms: nil,
                 urgent: 0,
                 sent: 0,
-                joystick: %Joystick{}
+                joystick: %Joystick{},
+                driver: {nil, 0}
               ]
 
   @typedoc """
   `receiver` holds what was heard; of the peers, `gone` are shown as gone. `sequence` is the number of its last heartbeat, at
   `beat_ms`; `held` is what it last sent about the emergency stop, `urgent` how many faster heartbeats are left; `noted` is
-  what the blackboard has of this robot.
+  what the blackboard has of this robot. `driver` gave the last word of driving.
   """
   @type t :: %__MODULE__{
           config: Robot.Config.t(),
@@ -75,7 +78,8 @@ defmodule Swarm.Comms do
           beat_ms: integer() | nil,
           urgent: non_neg_integer(),
           sent: non_neg_integer(),
-          joystick: Joystick.t()
+          joystick: Joystick.t(),
+          driver: {giver :: String.t() | nil, at_ms :: integer()}
         }
 
   @typedoc """
@@ -178,13 +182,24 @@ defmodule Swarm.Comms do
        when (is_list(to) or is_atom(to)) and kind in [Message, Letter, Claim],
        do: if(Wire.names?(List.wrap(to)), do: message, else: malformed())
 
-  defp whole({:command, request, ref}, now_us), do: whole({:command, request, ref, nil}, now_us)
+  defp whole({:command, request, ref}, now_us),
+    do: whole({:command, request, ref, nil, nil}, now_us)
+
+  # What needs no stamp has its giver there.
+  defp whole({:command, request, ref, {:by, giver}}, now_us),
+    do: whole({:command, request, ref, nil, giver}, now_us)
+
+  defp whole({:command, request, ref, order}, now_us),
+    do: whole({:command, request, ref, order, nil}, now_us)
 
   # Without a reference nothing waits for an answer, as in lockstep, and it is not known from which node it comes.
-  defp whole({:command, request, ref, order}, now_us) when ref == nil or is_reference(ref) do
+  defp whole({:command, request, ref, order, giver}, now_us)
+       when ref == nil or is_reference(ref) do
     here? = ref != nil and node(ref) == node()
-    {:command, request, ref, Freshness.arrived(order, here?), now_us}
+    {:command, request, ref, Freshness.arrived(order, here?), Giver.of(giver, ref), now_us}
   end
+
+  defp whole({:ordered, _request, giver} = message, _now_us) when is_binary(giver), do: message
 
   defp whole({:stamp, ref}, now_us) when is_reference(ref), do: {:stamp, ref, now_us}
 
@@ -200,7 +215,7 @@ defmodule Swarm.Comms do
 
   defp whole({:unanswered, ref, _answer} = message, _now_us) when is_reference(ref), do: message
 
-  defp whole({:result, {:delivered, _command, ref}, outcome} = message, _now_us)
+  defp whole({:result, {:delivered, _command, ref, _giver}, outcome} = message, _now_us)
        when ref == nil or is_reference(ref),
        do: if(CommandHandler.outcome?(outcome), do: message, else: malformed())
 
@@ -258,13 +273,13 @@ defmodule Swarm.Comms do
     end
   end
 
-  def handle({:cast, {:command, request, ref, order, now_us}}, at_ms, s, board) do
+  def handle({:cast, {:command, request, ref, order, giver, now_us}}, at_ms, s, board) do
     # The e-stop itself knows what a reset is meant for.
     stopped = if EStop.takes?(request), do: nil, else: EStop.stopped(board)
 
     case Freshness.judge(s.config.boot, request, order, true, now_us, stopped) do
       {:ok, asked_us} ->
-        {s, command(request, {ref, asked_us, now_us}, order, s, at_ms, board)}
+        {s, command(request, {ref, giver, asked_us, now_us}, order, s, at_ms, board)}
 
       {:error, why} ->
         {reject(s, :too_old, 1), [{:reply, ref, Freshness.refusal(s.config.id, why)}]}
@@ -278,8 +293,13 @@ defmodule Swarm.Comms do
   def handle({:cast, {:unanswered, ref, answer}}, _at_ms, s, _board),
     do: {s, [{:reply, ref, answer}]}
 
-  def handle({:cast, {:result, {:delivered, command, ref}, outcome}}, _at_ms, s, _board),
-    do: {s, [{:reply, ref, CommandHandler.answer(outcome, s.config.id, command)}]}
+  def handle({:cast, {:result, {:delivered, command, ref, giver}, outcome}}, at_ms, s, _board) do
+    {s, told} = if outcome == :ok, do: accepted(s, command, giver, at_ms), else: {s, []}
+    {s, [{:reply, ref, CommandHandler.answer(outcome, s.config.id, command)} | told]}
+  end
+
+  def handle({:cast, {:ordered, request, giver}}, at_ms, s, _board),
+    do: accepted(s, request, giver, at_ms)
 
   def handle({:cast, {:rejected, why, count}}, _at_ms, s, _board), do: {reject(s, why, count), []}
 
@@ -384,7 +404,8 @@ defmodule Swarm.Comms do
     order = {s.config.boot, now_us - 1_000 * age_ms}
 
     if word do
-      {s, effects} = handle({:cast, {:command, word, nil, order, now_us}}, at_ms, s, board)
+      input = {:cast, {:command, word, nil, order, "its joystick", now_us}}
+      {s, effects} = handle(input, at_ms, s, board)
       {told, s} = Enum.flat_map_reduce(effects, s, &told/2)
       {s, [{:cast, :gate, {:present, age_ms}} | told]}
     else
@@ -401,10 +422,27 @@ defmodule Swarm.Comms do
 
   defp told(effect, s), do: {[effect], s}
 
+  # In lockstep no giver is known. Words of driving come ten times a second: the first of a hand is told.
+  defp accepted(s, _request, nil, _at_ms), do: {s, []}
+
+  defp accepted(s, {:move, _ahead, _turn, _for_s} = word, giver, at_ms) do
+    {last, last_ms} = s.driver
+    s = %{s | driver: {giver, at_ms}}
+
+    if last == giver and at_ms - last_ms < @pause_ms,
+      do: {s, []},
+      else: {s, [ordered_event(word, giver)]}
+  end
+
+  defp accepted(s, request, giver, _at_ms), do: {s, [ordered_event(request, giver)]}
+
+  defp ordered_event(request, giver),
+    do: {:event, [:swarm, :comms, :ordered], %{order: Order.words(request), by: giver}}
+
   # A sender that knows only this process reaches the e-stop through it.
-  defp command(request, {ref, asked_us, _now_us} = given, order, s, at_ms, board) do
+  defp command(request, {ref, giver, asked_us, _now_us} = given, order, s, at_ms, board) do
     cond do
-      EStop.takes?(request) -> [{:cast, :estop, {:in_time, request, ref, asked_us}}]
+      EStop.takes?(request) -> [{:cast, :estop, {:in_time, request, ref, asked_us, giver}}]
       Replacement.takes?(request) -> [Replacement.take(s.config.id, request, order, ref)]
       true -> CommandHandler.take(request, given, s, at_ms, board)
     end

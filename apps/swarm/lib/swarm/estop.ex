@@ -35,7 +35,7 @@ defmodule Swarm.EStop do
   alias Robot.Safety.Gate
   alias Swarm.Directory
   alias Swarm.EStop.{Answer, Broadcaster, Calls, State}
-  alias Swarm.Order.Freshness
+  alias Swarm.Order.{Freshness, Giver}
   alias Swarm.Wire.StopTags
 
   # The caller waits for half a second (`Swarm.Commands.Client`): a robot whose release no caller
@@ -153,13 +153,13 @@ defmodule Swarm.EStop do
 
   @doc """
   An input as it is handled, `{:cast, {:at, seen, message}}`: `seen` has the time `us`, and of the board whether the gate is
-  `latched?`, and its `presses`. What is malformed is unknown.
+  `latched?`, and its `presses`; `by` of an order whose giver is known (`Swarm.Order.Giver`). What is malformed is unknown.
   """
   @impl Role
   def arrive({:cast, message}, now_us, board) do
-    with message when message != :unknown <- whole(message) do
+    with whole when whole != :unknown <- whole(message) do
       seen = %{us: now_us, latched?: Board.latched?(board), presses: Gate.presses(board)}
-      {:cast, {:at, seen, message}}
+      {:cast, {:at, Map.merge(seen, giver(message)), whole}}
     end
   end
 
@@ -172,6 +172,7 @@ defmodule Swarm.EStop do
     do: if(Calls.call?(call) and Calls.age?(age_ms), do: message, else: :unknown)
 
   defp whole({:command, request, ref}), do: whole({:command, request, ref, nil})
+  defp whole({:command, request, ref, order, _giver}), do: whole({:command, request, ref, order})
 
   # Without a reference nothing waits for an answer, as in lockstep, and it is not known from which node it comes.
   defp whole({:command, request, ref, order}) when ref == nil or is_reference(ref) do
@@ -180,7 +181,7 @@ defmodule Swarm.EStop do
   end
 
   # From the robot's comms, which has determined when it was given.
-  defp whole({:in_time, request, ref, given_us})
+  defp whole({:in_time, request, ref, given_us, _giver})
        when (ref == nil or is_reference(ref)) and is_integer(given_us),
        do: {:command, request, ref, {:asked, given_us}}
 
@@ -193,6 +194,16 @@ defmodule Swarm.EStop do
     do: message
 
   defp whole(_unknown), do: :unknown
+
+  # A stop needs no stamp, and has its giver there.
+  defp giver({:command, _request, ref}), do: by(nil, ref)
+  defp giver({:command, _request, ref, {:by, giver}}), do: by(giver, ref)
+  defp giver({:command, _request, ref, _order}), do: by(nil, ref)
+  defp giver({:command, _request, ref, _order, giver}), do: by(giver, ref)
+  defp giver({:in_time, _request, _ref, _given_us, giver}), do: by(giver, nil)
+  defp giver(_other), do: %{}
+
+  defp by(giver, ref), do: if(by = Giver.of(giver, ref), do: %{by: by}, else: %{})
 
   defp about?({_pressed, given_us, ref}) when is_integer(given_us),
     do: ref == nil or is_reference(ref)
@@ -216,7 +227,8 @@ defmodule Swarm.EStop do
   defp take_in({:command, request, ref, order}, seen, s) do
     case Freshness.judge(s.boot, request, order, true, seen.us, s.pressed_us) do
       {:ok, given_us} ->
-        obey(request, {{s.boot, s.pressed}, given_us, ref}, seen, s)
+        {s, effects} = obey(request, {{s.boot, s.pressed}, given_us, ref}, seen, s)
+        {s, effects ++ tell(request, seen, s)}
 
       {:error, why} ->
         {s,
@@ -248,6 +260,12 @@ defmodule Swarm.EStop do
 
   defp take_in({:stamp, ref}, seen, s), do: {s, answer(ref, Freshness.stamp(s.boot, seen.us))}
   defp take_in({:unsaved, ref}, _seen, s), do: {s, [{:apply, {Answer, :unsaved, [s.robot, ref]}}]}
+
+  # Not from here: a log that hangs must delay no stop.
+  defp tell(request, %{by: giver}, s),
+    do: [{:apply, {Answer, :obeyed, [s.robot, request, giver]}}]
+
+  defp tell(_request, _seen, _s), do: []
 
   # A mission that is slow to end does not delay an emergency stop.
   defp obey(:stop, {_pressed, _given_us, ref}, seen, s),

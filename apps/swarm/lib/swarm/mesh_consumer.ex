@@ -4,7 +4,7 @@ defmodule Swarm.MeshConsumer do
   comms processes, the terms of services go to the blackboard and the emergency stop.
   """
   alias Robot.Names
-  alias Swarm.Order.Freshness
+  alias Swarm.Order.{Freshness, Giver}
   alias Swarm.{Blackboard, Comms, EStop, Message, MissionRegistry, Transport}
 
   @behaviour Mesh.Consumer
@@ -54,8 +54,16 @@ defmodule Swarm.MeshConsumer do
   @impl Mesh.Consumer
   def command(robot, request) do
     comms = Names.whereis(robot, :comms)
-    if comms != nil and relayed?(request), do: GenServer.cast(comms, request), else: :error
+    if comms != nil and relayed?(request), do: GenServer.cast(comms, named(request)), else: :error
   end
+
+  # Otherwise it would seem to be given by the node of the reference, which is this one.
+  defp named({:command, request, ref}), do: {:command, request, ref, {:by, "another node"}}
+
+  defp named({:command, request, ref, stamp}),
+    do: {:command, request, ref, stamp, "another node"}
+
+  defp named(request), do: request
 
   # The reference is one of this node, so that only the stamp tells when an order was given.
   defp relayed?({:stamp, ref}), do: is_reference(ref)
@@ -65,6 +73,9 @@ defmodule Swarm.MeshConsumer do
 
   defp relayed?({:command, _request, ref, stamp}),
     do: is_reference(ref) and Freshness.stamp?(stamp)
+
+  defp relayed?({:command, request, ref, stamp, giver}),
+    do: Giver.text(giver) != nil and relayed?({:command, request, ref, stamp})
 
   defp relayed?(_other), do: false
 end

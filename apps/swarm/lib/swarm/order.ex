@@ -120,6 +120,26 @@ defmodule Swarm.Order do
   end
 
   @doc """
+  An order in one short line, for logs.
+
+      iex> for order <- [:stop, {:estop, {:base@hall, 1, 1}}, {:goto, 1.0, -2.5, nil}, {:start, Some.Mission, []}],
+      ...>     do: Swarm.Order.words(order)
+      ["stop", "estop", "goto 1.0 -2.5", "start Some.Mission"]
+  """
+  @spec words(term()) :: String.t()
+  def words({:estop, _call}), do: "estop"
+
+  def words(order) when is_tuple(order) and tuple_size(order) > 0,
+    do: order |> Tuple.to_list() |> Enum.reject(&(&1 in [nil, []])) |> Enum.map_join(" ", &word/1)
+
+  def words(order), do: word(order)
+
+  defp word(atom) when is_atom(atom),
+    do: atom |> inspect() |> String.trim_leading(":")
+
+  defp word(term), do: brief(term)
+
+  @doc """
   Whether a robot may follow another: not itself, and none that follows it, directly or through
   others. `leaders` says which robot each follows.
 

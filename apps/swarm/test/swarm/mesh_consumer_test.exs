@@ -39,9 +39,15 @@ defmodule Swarm.MeshConsumerTest do
     assert {:ok, %Message{from: :mag1}} = Checked.open(heard)
     ref = make_ref()
 
-    for request <- [{:stamp, ref}, {:command, :stop, ref}, {:command, :start, ref, {7, 5}}] do
+    # The reference is one of this node, so that a giver is said, although it is not known which.
+    for {request, told} <- [
+          {{:stamp, ref}, {:stamp, ref}},
+          {{:command, :stop, ref}, {:command, :stop, ref, {:by, "another node"}}},
+          {{:command, :start, ref, {7, 5}}, {:command, :start, ref, {7, 5}, "another node"}},
+          {{:command, :start, ref, {7, 5}, "a@b"}, {:command, :start, ref, {7, 5}, "a@b"}}
+        ] do
       assert MeshConsumer.command(:consumer1, request) == :ok
-      assert_received {:"$gen_cast", ^request}
+      assert_received {:"$gen_cast", ^told}
       assert MeshConsumer.command(:consumer_away, request) == :error
     end
 
@@ -51,6 +57,9 @@ defmodule Swarm.MeshConsumerTest do
           {:command, :start, ref},
           {:command, :start, ref, {:asked, 5}},
           {:command, :start, ref, nil},
+          {:command, :start, ref, nil, "a@b"},
+          {:command, :start, ref, {7, 5}, "two\nlines"},
+          {:command, :start, ref, {7, 5}, :a@b},
           {:in_time, :reset, ref, 5},
           {:say, [], nil}
         ] do

@@ -55,6 +55,15 @@ defmodule Console.Page.Http do
     }
   end
 
+  @doc "The address and port of the other end of a connection, for logs; `?` of one that is gone."
+  @spec peer(:inet.socket()) :: String.t()
+  def peer(socket) do
+    case :inet.peername(socket) do
+      {:ok, {address, port}} -> "#{:inet.ntoa(address)}:#{port}"
+      {:error, _gone} -> "?"
+    end
+  end
+
   @doc "Answers with one line of text."
   @spec say(request(), 400..599, line :: String.t()) :: term()
   def say(request, status, line),

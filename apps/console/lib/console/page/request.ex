@@ -113,7 +113,7 @@ defmodule Console.Page.Request do
     Door.note(door, :live)
     reply.(Feed.map(feed))
     {:ok, client} = Client.start_link(feed, reply)
-    {:ok, orders} = Orders.start_link(&reply.(State.answer(&1, &2)))
+    {:ok, orders} = Orders.start_link("page #{peer(socket)}", &reply.(State.answer(&1, &2)))
     ping = fn -> :mochiweb_socket.send(socket, @ping) end
     _pusher = spawn_link(fn -> push(feed, reply, ping) end)
     source = Feed.source(feed)

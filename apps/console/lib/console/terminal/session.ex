@@ -65,7 +65,8 @@ defmodule Console.Terminal.Session do
     reader = spawn_link(reader(mode, self()))
     scene = module.scene(live)
     me = self()
-    {:ok, orders} = Orders.start_link(&send(me, {:answer, &1, &2}))
+    giver = if mode == :screen, do: "terminal of #{node()}", else: "prompt of #{node()}"
+    {:ok, orders} = Orders.start_link(giver, &send(me, {:answer, &1, &2}))
 
     session = %__MODULE__{
       module: module,

@@ -115,7 +115,7 @@ defmodule Mix.Tasks.Console do
   defp person(true, live) do
     case Tty.open() do
       {:ok, saved} ->
-        {:ok, orders} = Orders.start_link(fn _line, _answer -> :ok end)
+        {:ok, orders} = Orders.start_link("presence of #{node()}", fn _line, _answer -> :ok end)
         _notices = spawn_link(fn -> watch(live, nil) end)
         heard = spawn_link(fn -> heard(nil) end)
         IO.puts("Hold any key while you look after the robots; q ends this program.")

@@ -198,8 +198,10 @@ defmodule Lab.Replay.Robots do
   @impl Lab.Replay.Kind
   def reasons(%__MODULE__{replay: replay} = all, _before, _tick, id) do
     with %Moment{} = moment <- Record.Replay.moment(replay, id),
-         %{} = reasons <- Moment.reasons(moment),
-         do: {since(all, id, moment.at_ms), reasons}
+         %{order: order} = reasons <- Moment.reasons(moment) do
+      order = order && %{order | at_ms: since(all, id, order.at_ms)}
+      {since(all, id, moment.at_ms), %{reasons | order: order}}
+    end
   end
 
   @impl Lab.Replay.Kind

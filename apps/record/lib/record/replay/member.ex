@@ -49,16 +49,18 @@ defmodule Record.Replay.Member do
   @typedoc """
   Why a robot did at one tick what it did: what it perceived, the wishes of its behaviours by the
   weights with which they were compared (the chosen one first), what the gate let through of it
-  and by which limits, the mission's own words before and after, and the effects of the tick.
+  and by which limits, the mission's own words before and after, and the effects of the tick. Of
+  robots of processes the last order of a person, too.
   """
   @type reasons :: %{
-          percept: Robot.Percept.t(),
-          wishes: [{Robot.Wish.t(), weight :: float()}],
-          driving: %{twist: Hal.Twist.t(), limits: [atom()]} | nil,
-          stopped?: boolean(),
-          before: [{String.t(), String.t()}],
-          mission: [{String.t(), String.t()}],
-          effects: [Member.effect()]
+          :percept => Robot.Percept.t(),
+          :wishes => [{Robot.Wish.t(), weight :: float()}],
+          :driving => %{twist: Hal.Twist.t(), limits: [atom()]} | nil,
+          :stopped? => boolean(),
+          :before => [{String.t(), String.t()}],
+          :mission => [{String.t(), String.t()}],
+          :effects => [Member.effect()],
+          optional(:order) => Record.Replay.LastOrder.t() | nil
         }
 
   @doc """

@@ -5,12 +5,19 @@ defmodule Record.Replay.Moment do
   """
   alias Robot.Control.{Controller, Executive, Pilot}
   alias Robot.Mission.Runner
+  alias Record.Replay.LastOrder
 
-  defstruct at_ms: nil, tick: nil, driving: nil, mission: nil, stopped?: false, effects: []
+  defstruct at_ms: nil,
+            tick: nil,
+            driving: nil,
+            mission: nil,
+            stopped?: false,
+            effects: [],
+            order: nil
 
   @typedoc """
   `tick` is the controller before the last tick with the raw percept; `mission` the runner before
-  and after its last tick; `effects` those of executive and pilot since, newest first, at most some.
+  and after its last tick; `effects` those of executive and pilot since, newest first, at most some; `order` is the last one.
   """
   @type t :: %__MODULE__{
           at_ms: integer() | nil,
@@ -18,42 +25,52 @@ defmodule Record.Replay.Moment do
           driving: %{twist: Hal.Twist.t(), limits: [atom()]} | nil,
           mission: {before :: Runner.t(), Runner.t()} | nil,
           stopped?: boolean(),
-          effects: [term()]
+          effects: [term()],
+          order: LastOrder.t() | nil
         }
 
   @most 100
 
   @doc "Notes an entry of a role that has changed its part of the replay."
   @spec note(t() | nil, atom(), {atom(), term(), integer()}, map(), map()) :: t()
-  def note(nil, role, entry, before, after_it),
-    do: note(%__MODULE__{}, role, entry, before, after_it)
+  def note(moment, role, entry, before, after_it) do
+    moment = moment || %__MODULE__{}
 
-  def note(
-        moment,
-        :executive,
-        {:input, {:tick, raw}, at_ms},
-        %{state: %Executive{controller: controller}},
-        _after_it
-      ),
-      do: %{moment | at_ms: at_ms, tick: {controller, raw}, effects: []}
+    noted(
+      %{moment | order: LastOrder.note(moment.order, role, entry, before, after_it)},
+      role,
+      entry,
+      before,
+      after_it
+    )
+  end
 
-  def note(
-        moment,
-        :pilot,
-        {:input, {:cast, {:tick, _percept}}, _at_ms},
-        %{state: %Pilot{runner: before}},
-        %{state: %Pilot{runner: runner}}
-      ),
-      do: %{moment | mission: {before, runner}}
+  defp noted(
+         moment,
+         :executive,
+         {:input, {:tick, raw}, at_ms},
+         %{state: %Executive{controller: controller}},
+         _after_it
+       ),
+       do: %{moment | at_ms: at_ms, tick: {controller, raw}, effects: []}
 
-  def note(moment, :gate, {:effect, {:drive, twist, limits}, _at_ms}, _before, _after_it),
+  defp noted(
+         moment,
+         :pilot,
+         {:input, {:cast, {:tick, _percept}}, _at_ms},
+         %{state: %Pilot{runner: before}},
+         %{state: %Pilot{runner: runner}}
+       ),
+       do: %{moment | mission: {before, runner}}
+
+  defp noted(moment, :gate, {:effect, {:drive, twist, limits}, _at_ms}, _before, _after_it),
     do: %{moment | driving: %{twist: twist, limits: limits}, stopped?: :estop in limits}
 
-  def note(moment, role, {:effect, effect, _at_ms}, _before, _after_it)
-      when role in [:executive, :pilot],
-      do: %{moment | effects: Enum.take([effect | moment.effects], @most)}
+  defp noted(moment, role, {:effect, effect, _at_ms}, _before, _after_it)
+       when role in [:executive, :pilot],
+       do: %{moment | effects: Enum.take([effect | moment.effects], @most)}
 
-  def note(moment, _role, _entry, _before, _after_it), do: moment
+  defp noted(moment, _role, _entry, _before, _after_it), do: moment
 
   @doc """
   The reasons for the last tick: what was perceived, all wishes with their weights, the chosen one
@@ -71,6 +88,7 @@ defmodule Record.Replay.Moment do
       wishes: Controller.wishes(controller, raw),
       driving: moment.driving,
       stopped?: moment.stopped?,
+      order: moment.order,
       before: explain(before),
       mission: explain(mission),
       effects: effects(moment)

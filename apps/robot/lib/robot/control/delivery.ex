@@ -17,7 +17,7 @@ defmodule Robot.Control.Delivery do
   alias Robot.Mission
 
   @enforce_keys [:ways, :until_ms, :reply]
-  defstruct @enforce_keys ++ [asked: nil]
+  defstruct @enforce_keys ++ [asked: nil, by: nil]
 
   @type way ::
           {:hand, {:only | :except, module()} | {:taking | :naming, command :: atom()}}
@@ -38,12 +38,14 @@ defmodule Robot.Control.Delivery do
   @typedoc """
   `until_ms` is when the requester stops waiting, by the robot's clock (ms): a later command
   is refused. `asked` is the time of the request (`System.monotonic_time/1`, microseconds; `nil`
-  if unknown): a request from before a stop is refused. `reply` gets `:ok` or a refusal
+  if unknown): a request from before a stop is refused. `by` is who gave the command, for people who
+  ask why; recordings of before have none. `reply` gets `:ok` or a refusal
   (`t:Robot.Role.then/0`); `nil` where none waits.
   """
   @type t :: %__MODULE__{
           ways: [way()],
           asked: integer() | nil,
+          by: String.t() | nil,
           until_ms: integer(),
           reply: Robot.Role.then()
         }

@@ -4,7 +4,7 @@ defmodule Robot.Devices.Log do
   is back, when it refuses what it is told, when armed wheels are disarmed for a reason, when a bumper stays pressed, when the
   gate, a behaviour or a mission hangs, when pictures cannot be saved or nothing can be recorded, when the emergency stop
   would not survive a restart of the machine, when another robot has the same name, when one
-  is not believed because its numbers are impossible, when it refuses to drive by its own joystick, and when the mission is replaced. The events report changes, so retries of a device are not logged.
+  is not believed because its numbers are impossible, when it refuses to drive by its own joystick, when it obeys an order of a person, and when the mission is replaced. The events report changes, so retries of a device are not logged.
   """
   require Logger
   alias Hal.Event
@@ -32,7 +32,8 @@ defmodule Robot.Devices.Log do
     [:robot, :incident, :failed],
     [:swarm, :comms, :duplicate_id],
     [:swarm, :comms, :unique_id],
-    [:swarm, :comms, :joystick]
+    [:swarm, :comms, :joystick],
+    [:swarm, :comms, :ordered]
   ]
 
   @doc "Attaches the log to its events, once on a node."
@@ -153,6 +154,9 @@ defmodule Robot.Devices.Log do
     do: {:info, "#{robot}: the e-stop file #{file} is as the stop is"}
 
   def line(:healed, %{folder: folder}), do: {:info, "pictures are saved in #{folder} again"}
+
+  def line(:ordered, %{robot: robot, order: order, by: giver}),
+    do: {:info, "#{robot}: #{order}, by #{giver}"}
 
   def line(:joystick, %{line: line}), do: {:warning, "#{line} (its joystick says move)"}
 

@@ -6,21 +6,28 @@ defmodule Swarm.Commands.Client do
   """
   alias Mesh.Nonblocking
   alias Swarm.{Directory, EStop, Replacement}
-  alias Swarm.Order.Freshness
+  alias Swarm.Order.{Freshness, Giver}
 
   @answer_ms 500
   # In the dictionary of the process: the order may be given by any function of `Swarm`, also within code of others.
   @given {__MODULE__, :given_us}
+  @by {__MODULE__, :by}
 
   @doc "Calls a function whose orders count as given then (`Swarm.given/2`)."
   @spec given(at_us :: integer(), (... -> result)) :: result when result: term()
-  def given(at_us, fun) do
-    before = Process.put(@given, min(at_us, given_us()))
+  def given(at_us, fun), do: within(@given, min(at_us, given_us()), fun)
+
+  @doc "Calls a function whose orders are given by this giver then (`Swarm.by/2`)."
+  @spec by(giver :: String.t(), (... -> result)) :: result when result: term()
+  def by(giver, fun), do: within(@by, Giver.text(giver), fun)
+
+  defp within(key, value, fun) do
+    before = Process.put(key, value)
 
     try do
       fun.()
     after
-      if before, do: Process.put(@given, before), else: Process.delete(@given)
+      if before, do: Process.put(key, before), else: Process.delete(key)
     end
   end
 
@@ -193,7 +200,7 @@ defmodule Swarm.Commands.Client do
 
   # If there is no other way, the silent connection may still work.
   defp hand({:relay, pid}, id, order, ref) do
-    case Mesh.relay(id, order, ref) do
+    case Mesh.relay(id, relayed(order), ref) do
       :ok -> {:ok, {:relay, nil}}
       {:error, _no_way} when pid != nil -> hand(pid, id, order, ref)
       error -> error
@@ -202,9 +209,31 @@ defmodule Swarm.Commands.Client do
 
   defp hand(pid, _id, order, _ref), do: with(:ok <- Nonblocking.cast(pid, order), do: {:ok, pid})
 
+  # The reference that arrives is one of the robot's own node. A stop says no giver, so that robots of an older release
+  # take it, too.
+  defp relayed({:command, stop, ref, {:by, _giver}}), do: {:command, stop, ref}
+
+  defp relayed({:command, request, ref, order}),
+    do: {:command, request, ref, order, Giver.node_text(node()) || "another node"}
+
+  defp relayed(order), do: order
+
   defp now_us, do: System.monotonic_time(:microsecond)
 
   defp with_ref({:stamp}, ref), do: {:stamp, ref}
-  defp with_ref({:command, request}, ref), do: {:command, request, ref}
-  defp with_ref({:command, request, order}, ref), do: {:command, request, ref, order}
+
+  defp with_ref({:command, request}, ref) do
+    giver = Process.get(@by)
+
+    if giver != nil and EStop.takes?(request),
+      do: {:command, request, ref, {:by, giver}},
+      else: {:command, request, ref}
+  end
+
+  defp with_ref({:command, request, order}, ref) do
+    case Process.get(@by) do
+      nil -> {:command, request, ref, order}
+      giver -> {:command, request, ref, order, giver}
+    end
+  end
 end

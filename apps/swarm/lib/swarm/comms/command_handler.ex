@@ -56,12 +56,12 @@ defmodule Swarm.Comms.CommandHandler do
   """
   @spec take(
           term(),
-          {reference(), asked_us :: integer(), now_us :: integer()},
+          {reference(), giver :: String.t() | nil, asked_us :: integer(), now_us :: integer()},
           %{:config => Robot.Config.t(), :receiver => Receiver.t(), optional(atom()) => term()},
           at_ms :: integer(),
           Board.t() | Board.entries()
         ) :: [Robot.Role.effect()]
-  def take(request, {ref, asked_us, now_us}, %{receiver: receiver} = comms, at_ms, board) do
+  def take(request, {ref, giver, asked_us, now_us}, %{receiver: receiver} = comms, at_ms, board) do
     config = Replacement.config(comms.config, board)
 
     case judge(request, config, board, {receiver, at_ms}) do
@@ -72,10 +72,10 @@ defmodule Swarm.Comms.CommandHandler do
         [{:cast, :incidents, {:keep, config.id, ref}}]
 
       {:drive, order} ->
-        drive(order, config.id, ref, {asked_us, now_us})
+        drive(order, config.id, {ref, giver}, {asked_us, now_us})
 
       {:mission, ways, command} ->
-        deliver(ways, command, ref, {asked_us, now_us, at_ms})
+        deliver(ways, command, {ref, giver}, {asked_us, now_us, at_ms})
 
       answer ->
         [{:reply, ref, answer}]
@@ -144,9 +144,9 @@ defmodule Swarm.Comms.CommandHandler do
 
   # A drive that hangs does not answer, so comms has to; of two answers only the first
   # arrives.
-  defp drive(order, id, ref, {asked_us, now_us}) do
+  defp drive(order, id, {ref, giver}, {asked_us, now_us}) do
     until_ms = div(asked_us, 1_000) + @carry_out_ms
-    reply = {__MODULE__, :ordered, [id, ref]}
+    reply = {__MODULE__, :ordered, [id, ref, {order, giver}]}
     unanswered = {:unanswered, ref, {:error, "#{id}: the drive does not answer"}}
 
     [
@@ -156,12 +156,13 @@ defmodule Swarm.Comms.CommandHandler do
   end
 
   # By the robot's clock, which need not be the one of `asked_us`.
-  defp deliver(ways, command, ref, {asked_us, now_us, at_ms}) do
+  defp deliver(ways, command, {ref, giver}, {asked_us, now_us, at_ms}) do
     delivery = %Delivery{
       ways: ways,
       asked: asked_us,
+      by: giver,
       until_ms: at_ms + @carry_out_ms - div(now_us - asked_us, 1_000),
-      reply: {:cast, :comms, {:delivered, command, ref}}
+      reply: {:cast, :comms, {:delivered, command, ref, giver}}
     }
 
     [{:cast, :pilot, {:deliver, delivery, {:command, command}}}]
@@ -170,9 +171,19 @@ defmodule Swarm.Comms.CommandHandler do
   @doc """
   Called by the drive's device with the outcome of an order for the wheels; answers the caller.
   """
-  @spec ordered(atom(), reference(), :ok | {:error, line :: String.t()}) :: :ok
-  def ordered(_id, ref, :ok), do: Nonblocking.answer(ref, :ok)
-  def ordered(id, ref, {:error, line}), do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
+  @spec ordered(
+          atom(),
+          reference(),
+          {order :: atom(), giver :: String.t() | nil},
+          :ok | {:error, line :: String.t()}
+        ) :: :ok
+  def ordered(id, ref, {order, giver}, :ok) do
+    if giver, do: Swarm.Comms.ordered(id, order, giver)
+    Nonblocking.answer(ref, :ok)
+  end
+
+  def ordered(id, ref, _order, {:error, line}),
+    do: Nonblocking.answer(ref, {:error, "#{id}: #{line}"})
 
   @doc "Whether a term is the outcome of an order at pilot or executive, which has an answer."
   @spec outcome?(term()) :: boolean()

@@ -87,4 +87,9 @@ defmodule Swarm.EStop.Answer do
     with {:error, line} <- Readiness.stopped(Board.find!(robot)),
          do: {:error, "#{robot}: #{line}"}
   end
+
+  @doc "Tells the robot's comms that it obeys an order of this giver, for the log (`Hal.Event`)."
+  @spec obeyed(robot :: atom(), request :: term(), giver :: String.t()) :: :ok
+  def obeyed(robot, request, giver),
+    do: GenServer.cast(Robot.Names.via(robot, :comms), {:ordered, request, giver})
 end

@@ -35,6 +35,32 @@ defmodule Swarm.EStop.NodesTest do
     Process.exit(stands, :kill)
   end
 
+  test "a robot tells who on another node gave an order, and else which node did" do
+    [base] = Cluster.start_nodes(1)
+    id = robot(:estop_by)
+    listen(id, [:swarm, :comms, :ordered])
+    eventually(fn -> :erpc.call(base, Directory, :members, [{:robot, id}]) != [] end)
+    told = fn -> receive(do: ({[:swarm, :comms, :ordered], about} -> {about.order, about.by})) end
+
+    by = fn call ->
+      order(fn -> :erpc.call(base, Swarm, :by, ["page 10.0.0.9:5123", call]) end)
+    end
+
+    assert order(fn -> :erpc.call(base, Swarm, :goto, [id, {1, 1}]) end) == :ok
+    assert told.() == {"goto 1.0 1.0", Atom.to_string(base)}
+    assert :erpc.call(base, Swarm, :stop, []) == :ok
+    assert told.() == {"stop", Atom.to_string(base)}
+
+    for {call, words} <- [
+          {&Swarm.stop/0, "stop"},
+          {&Swarm.estop/0, "estop"},
+          {&Swarm.reset/0, "reset"}
+        ] do
+      assert by.(call) == :ok
+      assert told.() == {words, "page 10.0.0.9:5123"}
+    end
+  end
+
   test "a stop is not said to hold anybody where no robot is known" do
     [base] = Cluster.start_nodes(1)
     assert {:error, line} = :erpc.call(base, Swarm, :estop, [])

@@ -74,6 +74,7 @@ defmodule Tools.Replay.Moment do
   # The reasons of a robot at a time in seconds, line by line.
   defp explain(robot, at_s, reasons) do
     ["#{robot} at #{Format.decimals(at_s, 1)} s"] ++
+      section("last order", order(reasons[:order])) ++
       section("perceived", percept(reasons.percept)) ++
       section("wishes, the strongest first", wishes(reasons.wishes)) ++
       section("gate", gate(reasons)) ++
@@ -83,6 +84,15 @@ defmodule Tools.Replay.Moment do
 
   defp section(_title, []), do: []
   defp section(title, lines), do: ["#{title}:" | Enum.map(lines, &"  #{&1}")]
+
+  # A run in lockstep has no givers, and its commands are its options.
+  defp order(nil), do: []
+
+  defp order(%{order: order, by: giver, at_ms: at_ms, obeyed?: obeyed?}) do
+    by = if giver, do: " by #{giver}", else: ""
+    result = %{true => ", obeyed", false => ", not obeyed", nil => ""}[obeyed?]
+    ["#{Swarm.Order.words(order)}#{by} at #{Format.decimals(at_ms / 1000, 1)} s#{result}"]
+  end
 
   defp percept(%Percept{} = percept) do
     [
