@@ -38,6 +38,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
+  alias Swarm.EStop.Answer
   alias Swarm.Message.Receiver
 
   # The caller waits for half a second (`Swarm.Commands.Client`); after that nothing may begin.
@@ -178,7 +179,7 @@ defmodule Swarm.Comms.CommandHandler do
           :ok | {:error, line :: String.t()}
         ) :: :ok
   def ordered(id, ref, {order, giver}, :ok) do
-    if giver, do: Swarm.Comms.ordered(id, order, giver)
+    if giver, do: Answer.obeyed(id, order, giver)
     Nonblocking.answer(ref, :ok)
   end
 
