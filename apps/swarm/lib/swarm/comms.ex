@@ -18,7 +18,8 @@ defmodule Swarm.Comms do
   | `{:say, to, message}` | the mission: for a robot, several, or `:all` |
   | `{:command, request, ref, order, giver}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) and its giver (`Swarm.Order.Giver`) |
   | `{:stamp, ref}` | a sender on another node that will send an order |
-  | `{:result, {:delivered, command, ref}, outcome}` | pilot or executive, which an order has reached |
+  | `{:result, {:delivered, command, ref, giver}, outcome}` | pilot or executive, which an order has reached |
+  | `{:ordered, request, giver}` | the e-stop and the drive's device, which obey an order: it is told (`[:swarm, :comms, :ordered]`) |
   | `{:rival, identity, comms}` | another robot of this name |
   | `:stop` | the e-stop, which has changed |
   | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`), among it the base's own joystick, whose word is an order of a person (`Swarm.Comms.Joystick`) |
@@ -138,11 +139,6 @@ defmodule Swarm.Comms do
   @spec rival(robot :: atom(), NameClaim.identity()) :: :ok
   def rival(robot, {_boot, _node} = other),
     do: GenServer.cast(Names.via(robot, :comms), {:rival, other, nil})
-
-  @doc "Notes that the robot obeys an order of this giver, which is then told (`Hal.Event`)."
-  @spec ordered(robot :: atom(), request :: term(), giver :: String.t()) :: :ok
-  def ordered(robot, request, giver),
-    do: GenServer.cast(Names.via(robot, :comms), {:ordered, request, giver})
 
   @impl Role
   def name, do: :comms

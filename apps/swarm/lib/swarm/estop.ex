@@ -262,8 +262,10 @@ defmodule Swarm.EStop do
   defp take_in({:unsaved, ref}, _seen, s), do: {s, [{:apply, {Answer, :unsaved, [s.robot, ref]}}]}
 
   # Not from here: a log that hangs must delay no stop.
-  defp tell(request, %{by: giver}, s),
-    do: [{:apply, {Swarm.Comms, :ordered, [s.robot, request, giver]}}]
+  defp tell(request, %{by: giver}, s) do
+    said = [Names.via(s.robot, :comms), {:ordered, request, giver}]
+    [{:apply, {GenServer, :cast, said}}]
+  end
 
   defp tell(_request, _seen, _s), do: []
 

@@ -178,7 +178,7 @@ defmodule Swarm.Comms.CommandHandler do
           :ok | {:error, line :: String.t()}
         ) :: :ok
   def ordered(id, ref, {order, giver}, :ok) do
-    if giver, do: Swarm.Comms.ordered(id, order, giver)
+    if giver, do: GenServer.cast(Names.via(id, :comms), {:ordered, order, giver})
     Nonblocking.answer(ref, :ok)
   end
 
