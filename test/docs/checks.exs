@@ -116,6 +116,7 @@ defmodule Docs.Checks do
 
   # How blocks begin that nobody types.
   @shown [
+    "eval \"$(bin/livebook)\" && livebook server",
     "config/robots/rex.exs:3: profile: config/bodies/rover.exs:8",
     "network: [fleet: [\"mag1\"",
     "52.3 s replayed: all 11665 decisions on",

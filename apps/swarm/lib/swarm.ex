@@ -388,11 +388,15 @@ defmodule Swarm do
   @doc """
   Calls a function whose orders are given by `giver`, as people name it, and returns what it returns. The robots log and
   record who gave an order. A giver is a text of at most 60 printable bytes (ASCII); anything else is left out, and the order is
-  given by this node, as without this call.
+  given by this node, as without this call. A program that calls from elsewhere (`:erpc`), and has no function of this
+  node, says `{module, function, arguments}`.
 
       Swarm.by("page 127.0.0.1:5123", fn -> Swarm.goto(:mag1, {2.0, 1.0}) end)
+      Swarm.by("notebook of ann", {Swarm, :goto, [:mag1, {2.0, 1.0}]})
   """
-  @spec by(giver :: String.t(), (... -> result)) :: result when result: term()
+  @spec by(giver :: String.t(), (... -> result) | {module(), atom(), [term()]}) ::
+          result | term()
+        when result: term()
   defdelegate by(giver, fun), to: Commands.Client
 
   @doc false

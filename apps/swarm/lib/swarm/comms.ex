@@ -18,7 +18,8 @@ defmodule Swarm.Comms do
   | `{:say, to, message}` | the mission: for a robot, several, or `:all` |
   | `{:command, request, ref, order, giver}` | a person (`Swarm.Comms.CommandHandler`), with the stamp of the order (`Swarm.Order.Freshness`) and its giver (`Swarm.Order.Giver`) |
   | `{:stamp, ref}` | a sender on another node that will send an order |
-  | `{:result, {:delivered, command, ref}, outcome}` | pilot or executive, which an order has reached |
+  | `{:result, {:delivered, command, ref, giver}, outcome}` | pilot or executive, which an order has reached |
+  | `{:ordered, request, giver}` | the e-stop and the drive's device, which obey an order: it is told (`[:swarm, :comms, :ordered]`) |
   | `{:rival, identity, comms}` | another robot of this name |
   | `:stop` | the e-stop, which has changed |
   | `{:tick, seen}` | ten times a second, with what the process sees beside the board (`perceive/3`), among it the base's own joystick, whose word is an order of a person (`Swarm.Comms.Joystick`) |

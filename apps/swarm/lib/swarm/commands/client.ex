@@ -18,8 +18,13 @@ defmodule Swarm.Commands.Client do
   def given(at_us, fun), do: within(@given, min(at_us, given_us()), fun)
 
   @doc "Calls a function whose orders are given by this giver then (`Swarm.by/2`)."
-  @spec by(giver :: String.t(), (... -> result)) :: result when result: term()
-  def by(giver, fun), do: within(@by, Giver.text(giver), fun)
+  @spec by(giver :: String.t(), (... -> result) | {module(), atom(), [term()]}) ::
+          result | term()
+        when result: term()
+  def by(giver, {module, function, arguments}),
+    do: by(giver, fn -> apply(module, function, arguments) end)
+
+  def by(giver, fun) when is_function(fun, 0), do: within(@by, Giver.text(giver), fun)
 
   defp within(key, value, fun) do
     before = Process.put(key, value)
