@@ -7,7 +7,7 @@ defmodule Tools.Api do
   @external_resource @table
   @rooms Rooms.table(File.read!(@table))
 
-  @shared for name <- ["api.css", "api.js"], do: Path.join(@root, "apps/tools/priv/api/#{name}")
+  @shared for name <- ["api.css", "api.js"], do: Path.join(@root, "apps/tools/assets/#{name}")
   for path <- @shared, do: @external_resource(path)
   @files for path <- @shared, do: {Path.basename(path), File.read!(path)}
 

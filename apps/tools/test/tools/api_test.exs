@@ -156,7 +156,7 @@ defmodule Tools.ApiTest do
     )
 
     for name <- ["api.css", "api.js"],
-        do: File.cp!(Path.join("priv/api", name), Path.join(folder, name))
+        do: File.cp!(Path.join("assets", name), Path.join(folder, name))
 
     browser = Browser.open({1280, 800})
     Browser.go(browser, "file://#{Path.expand(folder)}/index.html")
