@@ -29,7 +29,7 @@ defmodule Bridge.RmfTest do
 
   defp ask(method, request) do
     {:ok, {{_http, status, _}, _headers, body}} =
-      :httpc.request(method, request, [], body_format: :binary)
+      :httpc.request(method, request, [ssl: []], body_format: :binary)
 
     case Bridge.Json.decode(body) do
       {:ok, %{} = answer} when status == 200 -> answer

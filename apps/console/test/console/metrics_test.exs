@@ -98,7 +98,7 @@ defmodule Console.MetricsTest do
 
   defp get(url) do
     {:ok, {{_http, status, _}, _headers, body}} =
-      :httpc.request(:get, {~c"#{url}metrics", []}, [], body_format: :binary)
+      :httpc.request(:get, {~c"#{url}metrics", []}, [ssl: []], body_format: :binary)
 
     {status, body}
   end
