@@ -208,7 +208,7 @@ defmodule Swarm do
   what they decided. Robots whose files have `incidents:` do it, too, at an emergency stop, a fault or a crash.
 
       Swarm.keep(:mag1)
-      {:ok, "mag1: the last 60 s are kept in /var/lib/convoy/incidents"}
+      {:ok, "mag1: what it knows of the last 60 s is being written to /var/lib/convoy/incidents"}
 
   The answer says that it is being written; the robot's log says in which file, or why in none.
   """

@@ -108,6 +108,15 @@ defmodule Bridge.RmfTest do
     Swarm.Case.eventually(fn -> data(c)["last_completed_request"] == 2 end, 5_000)
   end
 
+  test "one that still rolls does not stand, though it is seen at the same place twice" do
+    alias Bridge.Rmf.Command
+    command = Command.given(%Command{id: 2, goal: :stop}, 2, 0)
+    robot = %{pose: Pose.new(1, 2), state: :idle, speed: 0.2}
+    assert Command.seen(command, robot, robot, 2_000).completed == nil
+    assert Command.seen(command, %{robot | speed: nil}, robot, 2_000).completed == nil
+    assert Command.seen(command, %{robot | speed: 0.0}, robot, 2_000).completed == 2
+  end
+
   test "poses leave and goals enter in Open-RMF's frame", c do
     Application.put_env(:bridge, :rmf, map: "B2", frame: {10.0, 0.0, :math.pi() / 2})
     on_exit(fn -> Application.delete_env(:bridge, :rmf) end)

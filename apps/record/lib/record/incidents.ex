@@ -56,7 +56,7 @@ defmodule Record.Incidents do
     now_ms = Clock.now_ms()
 
     for {id, queue} <- queues,
-        do: {:ok, _} = {Names.register(id, :incidents, queue), nil} |> registered()
+        do: :ok = Names.register(id, :incidents, queue)
 
     for event <- @events do
       _before = Event.detach({__MODULE__, ids, event})
@@ -83,9 +83,6 @@ defmodule Record.Incidents do
      }}
   end
 
-  defp registered({:ok, _none}), do: {:ok, :registered}
-  defp registered({error, _none}), do: error
-
   @doc false
   # In the process in which it happened.
   def heard(event, _measured, %{robot: robot} = about, {pid, ids}) do
@@ -103,7 +100,9 @@ defmodule Record.Incidents do
 
   @impl GenServer
   def handle_cast({:keep, robot, ref}, s) do
-    line = "#{robot}: the last #{div(s.keep_ms, 1_000)} s are kept in #{s.file[:path]}"
+    line =
+      "#{robot}: what it knows of the last #{div(s.keep_ms, 1_000)} s is being written to #{s.file[:path]}"
+
     Mesh.Nonblocking.answer(ref, {:ok, line})
     {:noreply, because(s, "#{robot}: a person asked")}
   end

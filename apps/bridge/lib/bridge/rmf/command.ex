@@ -15,6 +15,8 @@ defmodule Bridge.Rmf.Command do
   @near_m 0.5
   # A robot that moves less between two looks stands.
   @still_m 0.005
+  # The speed (m/s) that its wheels report at rest.
+  @still_m_s 0.01
   # What is seen of a robot of a mesh may be so old.
   @old_ms 1_000
 
@@ -74,7 +76,11 @@ defmodule Bridge.Rmf.Command do
   def seen(command, %{pose: nil}, _before, _at_ms), do: command
 
   def seen(%__MODULE__{goal: :stop} = command, robot, before, _at_ms) do
-    stands? = match?(%{pose: %Pose{}}, before) and moved(robot, before) < @still_m
+    # What is seen of a mesh may be the same report twice, so its wheels must say so, too.
+    stands? =
+      match?(%{pose: %Pose{}}, before) and moved(robot, before) < @still_m and
+        is_number(robot.speed) and abs(robot.speed) < @still_m_s
+
     if stands?, do: %{command | completed: command.id}, else: command
   end
 

@@ -109,5 +109,6 @@ defmodule Bridge.Rmf.Manager do
        when frame == :lost or state == :no_answer,
        do: %{id: status.robot, state: state, pose: nil}
 
-  defp robot(status), do: %{id: status.robot, state: status.state, pose: status.pose}
+  defp robot(status),
+    do: %{id: status.robot, state: status.state, pose: status.pose, speed: status.speed}
 end
