@@ -12,10 +12,10 @@ defmodule Vision.Mark do
       poses fit what is seen, as from straight ahead or from afar
     * `range_sd`, `bearing_sd`, `yaw_sd` - their standard deviations
 
-  `range` and all after it are `nil` if the camera's field of view is not known.
+  `width` and `height` are those of the frame. `range` and all after it are `nil` if the camera's field of view is not known.
   """
 
-  @enforce_keys [:family, :id, :at_ms, :x, :y, :corners]
+  @enforce_keys [:family, :id, :at_ms, :x, :y, :corners, :width, :height]
   defstruct @enforce_keys ++
               [range: nil, bearing: nil, yaw: nil, range_sd: nil, bearing_sd: nil, yaw_sd: nil]
 
@@ -28,6 +28,8 @@ defmodule Vision.Mark do
           x: float(),
           y: float(),
           corners: [point(), ...],
+          width: pos_integer(),
+          height: pos_integer(),
           range: float() | nil,
           bearing: float() | nil,
           yaw: float() | nil,
@@ -37,21 +39,30 @@ defmodule Vision.Mark do
         }
 
   @doc """
-  The pixels that its border touches: the first and the last column and row, at most those of a picture of this size.
+  The pixels that its border touches: the first and the last column and row inside the frame.
 
       iex> corners = [{10.2, 5.0}, {20.7, 5.5}, {20.5, 15.9}, {10.0, 15.0}]
-      iex> mark = %Vision.Mark{family: :tag36h11, id: 1, at_ms: 0, x: 15.0, y: 10.0, corners: corners}
-      iex> Vision.Mark.box(mark, {20, 20})
+      iex> mark = %Vision.Mark{family: :tag36h11, id: 1, at_ms: 0, x: 15.0, y: 10.0, corners: corners, width: 20, height: 20}
+      iex> Vision.Mark.box(mark)
       {10, 5, 19, 16}
   """
-  @spec box(t(), {width :: pos_integer(), height :: pos_integer()}) ::
-          {left :: integer(), top :: integer(), right :: integer(), bottom :: integer()}
-  def box(%__MODULE__{corners: corners}, {width, height}) do
+  @spec box(t()) :: {left :: integer(), top :: integer(), right :: integer(), bottom :: integer()}
+  def box(%__MODULE__{corners: corners, width: width, height: height}) do
     {{left, right}, {top, bottom}} = bounds(corners)
 
     {max(floor(left), 0), max(floor(top), 0), min(ceil(right), width - 1),
      min(ceil(bottom), height - 1)}
   end
+
+  @doc """
+  What people call it.
+
+      iex> corners = List.duplicate({0.0, 0.0}, 4)
+      iex> Vision.Mark.name(%Vision.Mark{family: :tag36h11, id: 7, at_ms: 0, x: 0.0, y: 0.0, corners: corners, width: 2, height: 2})
+      "tag36h11 7"
+  """
+  @spec name(t()) :: String.t()
+  def name(%__MODULE__{family: family, id: id}), do: "#{family} #{id}"
 
   @doc "The least and the greatest x, and the same of y."
   @spec bounds([point(), ...]) :: {{float(), float()}, {float(), float()}}

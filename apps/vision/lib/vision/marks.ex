@@ -103,7 +103,9 @@ defmodule Vision.Marks do
       at_ms: frame.at_ms,
       x: x,
       y: y,
-      corners: corners
+      corners: corners,
+      width: frame.width,
+      height: frame.height
     }
 
     struct!(mark, reading(corners, frame, marks.size))

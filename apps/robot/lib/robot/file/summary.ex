@@ -88,6 +88,7 @@ defmodule Robot.File.Summary do
         camera: robot.camera && device(robot.camera),
         lidar: robot.scan && device(robot.scan),
         "looks for": colours(robot.colours),
+        marks: marks(robot.marks),
         keeps: pictures(robot.save_pictures),
         records: recording(robot.record),
         keeps: incidents(robot.incidents),
@@ -256,6 +257,9 @@ defmodule Robot.File.Summary do
       if class.distance, do: "#{class.name} (with distance)", else: class.name
     end)
   end
+
+  defp marks(nil), do: nil
+  defp marks(marks), do: "#{marks[:family]}, #{metres(marks[:size])} between their corners"
 
   defp start(%Pose{x: x, y: y, heading: heading}),
     do: "at x #{metres(x)}, y #{metres(y)}, heading #{degrees(heading)}"

@@ -15,7 +15,8 @@ defmodule Vision.Marks.ScheduleTest do
       {x - half, y + half}
     ]
 
-    %Mark{family: :tag36h11, id: 1, at_ms: 0, x: x, y: y, corners: corners}
+    place = %{x: x, y: y, corners: corners, width: 640, height: 480}
+    struct!(Mark, Map.merge(place, %{family: :tag36h11, id: 1, at_ms: 0}))
   end
 
   defp plans(period_ms, marks) do
