@@ -97,8 +97,15 @@ defmodule Lab.Trial do
       script: Script.new(options.moves, options.kills, options.script),
       run_log: RunLog.new(elem(setup.mission, 0)),
       colours: World.colours(),
-      marks: Setup.marks(options)
+      marks: marks(options)
     }
+  end
+
+  defp marks(%{marks: nil}), do: nil
+
+  defp marks(options) do
+    {:ok, marks} = Vision.Marks.new(Setup.looked_for(options))
+    marks
   end
 
   @doc "What was recorded since the last call, oldest first."

@@ -97,14 +97,13 @@ defmodule Lab.Trial.Options do
     place = List.duplicate({:number, -1.0e4, 1.0e4}, 3)
 
     Vision.Marks.table()
-    |> Keyword.put(:size, [{:number, 0.01, 10.0, "m"}, default: 0.16])
     |> Keyword.merge(
-      height: [{:number, 0.0, 100.0, "m"}, default: 0.3],
+      height: {:number, 0.0, 100.0, "m"},
       at: [
         {:list,
          {:tuple, [{:integer, 0, 65_535}, {:tuple, place, "{x, y, degrees}"}],
           "{id, {x, y, degrees}}"}},
-        default: []
+        required: true
       ]
     )
   end

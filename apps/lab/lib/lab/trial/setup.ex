@@ -6,6 +6,7 @@ defmodule Lab.Trial.Setup do
   alias Hal.{Pose, Profile}
   alias Lab.Trial.Options
   alias Sim.World
+  alias Vision.Marks
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys ++ [plan: nil]
@@ -69,7 +70,7 @@ defmodule Lab.Trial.Setup do
            at(["map"], Sim.Floorplan.open(options.map, length(options.robots), options.grey)),
          :ok <- at(["landmark"], check_landmarks(map, asked)),
          :ok <- at(["moves"], check_landmarks(map, moves)),
-         :ok <- at(["marks"], check_marks(options.marks)),
+         :ok <- at(["marks"], check_marks(options)),
          :ok <- check_script(map, options),
          {:ok, landmark, starts} <-
            at(["map"], Sim.Floorplan.places(map, bodies, options.seed, landmark)) do
@@ -107,27 +108,20 @@ defmodule Lab.Trial.Setup do
     end)
   end
 
-  @doc "What the cameras of such a run look for; `nil` for no marks."
-  @spec marks(map()) :: Vision.Marks.t() | nil
-  def marks(%{marks: nil}), do: nil
-
-  def marks(%{marks: marks}),
-    do: %Vision.Marks{family: marks[:family], size: marks[:size]}
-
-  @doc "The same as an option of `Robot.Config`."
+  @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
   @spec looked_for(map()) :: keyword() | nil
   def looked_for(%{marks: nil}), do: nil
   def looked_for(%{marks: marks}), do: Keyword.take(marks, [:family, :size])
 
-  defp check_marks(nil), do: :ok
+  defp check_marks(%{marks: nil}), do: :ok
 
-  defp check_marks(marks) do
-    with :ok <- Vision.Marks.available() do
-      unknown = fn {id, _at} -> Vision.Marks.Native.picture(marks[:family], id) == nil end
+  defp check_marks(%{marks: given} = options) do
+    with :ok <- Marks.available(), {:ok, %{family: family}} <- Marks.new(looked_for(options)) do
+      unknown = fn {id, _at} -> Marks.Native.picture(family, id) == nil end
 
-      case Enum.find(marks[:at], unknown) do
+      case Enum.find(given[:at], unknown) do
         nil -> :ok
-        {id, _at} -> {:error, "#{marks[:family]} has no mark #{id}"}
+        {id, _at} -> {:error, "#{family} has no mark #{id}"}
       end
     end
   end

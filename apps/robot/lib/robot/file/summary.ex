@@ -259,7 +259,11 @@ defmodule Robot.File.Summary do
   end
 
   defp marks(nil), do: nil
-  defp marks(marks), do: "#{marks[:family]}, #{metres(marks[:size])} between their corners"
+
+  defp marks(given) do
+    {:ok, marks} = Vision.Marks.new(given)
+    "#{marks.family}, #{metres(marks.size)} between their corners"
+  end
 
   defp start(%Pose{x: x, y: y, heading: heading}),
     do: "at x #{metres(x)}, y #{metres(y)}, heading #{degrees(heading)}"
