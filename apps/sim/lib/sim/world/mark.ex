@@ -32,14 +32,23 @@ defmodule Sim.World.Mark do
   @doc "A mark, of keys and values. Wrong ones, and a missing library, raise `ArgumentError`."
   @spec new!(keyword()) :: t()
   def new!(options) do
-    mark = options |> Options.check!(@table, "mark") |> Map.new()
-
+    options = Options.check!(options, @table, "mark")
     with {:error, line} <- Marks.available(), do: raise(ArgumentError, line)
 
-    case Marks.Native.picture(mark.family, mark.id) do
-      nil -> raise ArgumentError, "mark option id: #{mark.family} has no mark #{mark.id}"
-      picture -> struct!(__MODULE__, Map.put(mark, :packed, packed(mark, picture)))
+    case Marks.Native.picture(options[:family], options[:id]) do
+      nil ->
+        raise ArgumentError, "mark option id: #{options[:family]} has no mark #{options[:id]}"
+
+      picture ->
+        painted!(options, picture)
     end
+  end
+
+  @doc "The same with another picture (`Vision.Marks.Native.picture/2`) than that of its id."
+  @spec painted!(keyword(), {pos_integer(), pos_integer(), binary()}) :: t()
+  def painted!(options, picture) do
+    mark = options |> Options.check!(@table, "mark") |> Map.new()
+    struct!(__MODULE__, Map.put(mark, :packed, packed(mark, picture)))
   end
 
   # With the white cells round it that it is printed with.
