@@ -3,6 +3,7 @@ defmodule Bench.MarksTest do
   alias Bench.Marks.Runner
   alias Vision.Marks
 
+  doctest Runner
   @moduletag skip: with({:error, line} <- Marks.available(), do: line, else: (:ok -> false))
   @maps ["hall", "hospital"]
 

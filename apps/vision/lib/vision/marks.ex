@@ -13,6 +13,8 @@ defmodule Vision.Marks do
   @families [:tag36h11, :tagStandard41h12]
   # Marks with less contrast between their cells, in grey levels of 255, are left out.
   @least_margin 5.0
+  # So near to the edge of the frame corners are off by pixels, and ranges by as much as 4 %.
+  @edge_px 3.0
 
   @enforce_keys [:family, :size]
   defstruct @enforce_keys
@@ -65,7 +67,8 @@ defmodule Vision.Marks do
   end
 
   @doc """
-  The marks that hold in a frame, by id and then from the left, and the schedule for the next frame. Where the schedule has
+  The marks that hold in a frame, by id and then from the left, and the schedule for the next frame. Marks at the edge of the
+  frame are left out. Where the schedule has
   nothing searched in this frame, they are those of the last search, with its `at_ms`.
   """
   @spec look(t(), Native.detector(), Schedule.t(), Frame.t()) ::
@@ -73,7 +76,7 @@ defmodule Vision.Marks do
   def look(%__MODULE__{} = marks, detector, %Schedule{} = schedule, %Frame{} = frame) do
     with {part, boxes} <- Schedule.plan(schedule, frame.at_ms, {frame.width, frame.height}),
          {:ok, found} <- search(boxes, detector, frame, []) do
-      seen = for one <- Enum.sort(found), clear?(one), do: mark(one, marks, frame)
+      seen = for one <- Enum.sort(found), clear?(one, frame), do: mark(one, marks, frame)
       {:ok, seen, Schedule.note(schedule, part, frame.at_ms, seen)}
     else
       :rest -> {:ok, schedule.marks, schedule}
@@ -94,7 +97,13 @@ defmodule Vision.Marks do
          do: search(boxes, detector, frame, more ++ found)
   end
 
-  defp clear?({_id, _wrong_bits, margin, _centre, _corners}), do: margin >= @least_margin
+  defp clear?({_id, _wrong_bits, margin, _centre, corners}, %Frame{width: width, height: height}) do
+    margin >= @least_margin and
+      Enum.all?(corners, fn {x, y} ->
+        x >= @edge_px and y >= @edge_px and x <= width - 1 - @edge_px and
+          y <= height - 1 - @edge_px
+      end)
+  end
 
   defp mark({id, _wrong_bits, _margin, {x, y}, corners}, marks, frame) do
     mark = %Mark{

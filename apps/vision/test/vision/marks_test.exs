@@ -117,6 +117,12 @@ defmodule Vision.MarksTest do
     assert find(spoil.(clean, Enum.take(inner, 2))) == {:ok, []}
   end
 
+  test "what is at the edge of the frame would be measured wrong, and is left out" do
+    assert {:ok, [%{id: 6}]} = find(frame([{6, 100, 0}]))
+    assert {:ok, [%{id: 6}]} = find(frame([{6, 270, 100}]))
+    for mark <- [{6, 100, -3}, {6, 273, 100}], do: assert(find(frame([mark])) == {:ok, []})
+  end
+
   test "between whole pictures only the surroundings of marks are searched" do
     {marks, detector} = detector()
     look = fn schedule, frame -> Marks.look(marks, detector, schedule, frame) end

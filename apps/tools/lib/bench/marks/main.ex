@@ -41,7 +41,8 @@ defmodule Bench.Marks.Main do
           IO.puts("\nMarks seen in #{empty} pictures without one: #{wrong}")
           note.("pictures with a mark")
           seen = Runner.tagged(family, tagged, @maps, seed)
-          IO.puts("Ids in #{tagged} pictures with one: #{words(seen)}\n")
+          IO.puts("Ids in #{tagged} pictures with one: #{words(seen)}")
+          IO.puts("A picture is searched in #{Runner.times(seen)} (median / 95 %)\n")
           IO.write(Table.markdown(errors(), Runner.errors(seen)))
         end
       end)

@@ -4,13 +4,19 @@ defmodule Bench.Marks.Runner do
   alias Bench.Marks.Rooms
   alias Sim.World
   alias Vision.Mark
+  alias Vision.Marks.Schedule
 
   @bands [{0, 20}, {20, 40}, {40, 60}, {60, 1_000}]
 
-  @typedoc "What became of a mark in a picture, how wide it is there, and how wrong its reading is."
+  @typedoc """
+  What became of a mark in a picture, how wide it is there, how wrong its reading is, and how long the search took, of the whole
+  picture and of the surroundings of what was seen.
+  """
   @type seen :: %{
           what: :right | :none | :wrong,
           width: float(),
+          whole_us: non_neg_integer(),
+          boxes_us: non_neg_integer(),
           errors: {{float(), float()}, {float(), float()}, {float(), float()} | nil} | nil
         }
 
@@ -67,8 +73,13 @@ defmodule Bench.Marks.Runner do
     each(pictures, maps, seed, fn world, _n, random ->
       {world, hung, random} = Rooms.marked(world, family, random)
       frame = World.frame(world, :mag1)
-      {:ok, seen} = Vision.Marks.find(marks, detector, frame)
-      {world, judge(seen, hung, frame), random}
+      look = &Vision.Marks.look(marks, detector, &1, &2)
+      {whole_us, {:ok, seen, schedule}} = :timer.tc(fn -> look.(%Schedule{}, frame) end)
+      # The next picture: only where the mark was.
+      next = %{frame | at_ms: frame.at_ms + 100}
+      {boxes_us, _again} = :timer.tc(fn -> look.(schedule, next) end)
+      times = %{whole_us: whole_us, boxes_us: boxes_us}
+      {world, Map.merge(judge(seen, hung, frame), times), random}
     end)
   end
 
@@ -110,6 +121,26 @@ defmodule Bench.Marks.Runner do
       end
 
     {{range / hung.range, range / mark.range_sd}, {bearing, bearing / mark.bearing_sd}, yaw}
+  end
+
+  @doc """
+  How long searches took: median and 95 % in milliseconds.
+
+      iex> Bench.Marks.Runner.times([%{what: :right, whole_us: 8_000, boxes_us: 900}])
+      "8.0 / 8.0 ms, 0.9 / 0.9 ms of the surroundings of a mark"
+  """
+  @spec times([seen()]) :: String.t()
+  def times(seen) do
+    right = Enum.filter(seen, &(&1.what == :right))
+    "#{ms(seen, :whole_us)} ms, #{ms(right, :boxes_us)} ms of the surroundings of a mark"
+  end
+
+  defp ms(seen, key) do
+    values = Enum.map(seen, & &1[key])
+
+    Enum.map_join([0.5, 0.95], " / ", fn share ->
+      :erlang.float_to_binary(Table.quantile(values, share) / 1000, decimals: 1)
+    end)
   end
 
   @doc "The rows of errors by how wide the mark is."
