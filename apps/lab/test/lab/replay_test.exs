@@ -56,7 +56,7 @@ defmodule Lab.ReplayTest do
 
   defp steps(entries), do: Enum.count(entries, &match?({:step, _, _, _}, &1))
 
-  @tag skip: (with {:error, line} <- Vision.Marks.available(), do: line, else: (:ok -> false))
+  @tag skip: with({:error, line} <- Vision.Marks.available(), do: line, else: (:ok -> false))
   test "a run with marks in it replays to the byte" do
     same([marks: [size: 0.3, at: [{3, {1.5, 0.0, 180}}, {8, {0.0, 1.5, -90}}]]], 60)
   end

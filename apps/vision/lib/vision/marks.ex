@@ -13,7 +13,7 @@ defmodule Vision.Marks do
   @families [:tag36h11, :tagStandard41h12]
   # Marks with less contrast between their cells, in grey levels of 255, are left out.
   @least_margin 5.0
-  # So near to the edge of the frame corners are off by pixels, and ranges by as much as 4 %.
+  # A corner that was nearer to the edge of the frame made a range 4 % too long.
   @edge_px 3.0
 
   @enforce_keys [:family, :size]
