@@ -5,8 +5,12 @@ defmodule Mix.Tasks.Compile.Native do
 
       native: [
         nifs: [blobs: ["blobs.c", "blobs_nif.c"]],          # priv/blobs.so
-        programs: [newest_frame: ["newest_frame.c"]]        # priv/newest_frame
+        programs: [newest_frame: ["newest_frame.c"]],       # priv/newest_frame
+        optional: [marks: {"apriltag", "apriltag/apriltag.h", ["marks.c", "marks_nif.c"]}]
       ]
+
+  An `optional` NIF is built with a library of the system, `-lapriltag` here, where its header is. Elsewhere it is left
+  out without a word: its module says why it does nothing.
 
   Everything is compiled with `-Wall -Wextra -Werror`, and with `-ffp-contract=off`, so that
   floating-point results are the same on every machine and equal to the Elixir references.
@@ -25,11 +29,17 @@ defmodule Mix.Tasks.Compile.Native do
       for {name, sources} <- native[:nifs] || [],
           do: {Path.join(priv, "#{name}.so"), sources, ~w(-shared -fPIC -I) ++ [erts_include()]}
 
+    optional =
+      for {name, {library, header, sources}} <- native[:optional] || [],
+          target = Path.join(priv, "#{name}.so"),
+          there?(header),
+          do: {target, sources, ~w(-shared -fPIC -I) ++ [erts_include(), "-l#{library}"]}
+
     programs =
       for {name, sources} <- native[:programs] || [],
           do: {Path.join(priv, "#{name}"), sources, []}
 
-    results = Enum.map(nifs ++ programs, &build/1)
+    results = Enum.map(nifs ++ optional ++ programs, &build/1)
 
     cond do
       :error in results -> {:error, []}
@@ -46,7 +56,8 @@ defmodule Mix.Tasks.Compile.Native do
 
     if Mix.Utils.stale?(sources ++ headers ++ [__ENV__.file], [target]) do
       File.mkdir_p!(Path.dirname(target))
-      arguments = @flags ++ flags ++ ["-o", target] ++ sources ++ ["-lm"]
+      {libraries, flags} = Enum.split_with(flags, &String.starts_with?(&1, "-l"))
+      arguments = @flags ++ flags ++ ["-o", target] ++ sources ++ libraries ++ ["-lm"]
 
       case System.cmd("gcc", arguments, stderr_to_stdout: true) do
         {_output, 0} ->
@@ -59,6 +70,12 @@ defmodule Mix.Tasks.Compile.Native do
     else
       :noop
     end
+  end
+
+  # Where gcc looks for headers.
+  defp there?(header) do
+    question = ["-include", header, "-E", "-x", "c", "/dev/null"]
+    match?({_source, 0}, System.cmd("gcc", question, stderr_to_stdout: true))
   end
 
   defp erts_include,

@@ -5,7 +5,12 @@ defmodule Vision.MixProject do
 
   def project do
     Convoy.Support.project(:vision,
-      native: [nifs: [blobs: ["blobs.c", "blobs_nif.c"]]],
+      native: [
+        nifs: [blobs: ["blobs.c", "blobs_nif.c"]],
+        optional: [
+          marks: {"apriltag", "apriltag/apriltag.h", ["marks.c", "blobs.c", "marks_nif.c"]}
+        ]
+      ],
       packages: [nx: "~> 0.6", evision: "~> 0.2.10"],
       deps: [
         {:hal, in_umbrella: true}

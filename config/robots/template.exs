@@ -81,6 +81,10 @@
   # distance is the share of the picture that a thing fills which is 1 m away.
   colours: "landmark.txt",
 
+  # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none. The size is the
+  # side of the square between the corners, in metres.
+  marks: nil,
+
   # Keeps pictures of the camera as JPEG, so many a second, the newest of them, in a folder that is there:
   # [folder: "/var/lib/convoy/pictures", rate: 1.0, files: 1000, megabytes: 100], or nil for none.
   save_pictures: nil,

@@ -55,6 +55,16 @@ typedef struct {
     uint8_t kind, paint[3];
 } sim_pole;
 
+/* A flat square picture that stands upright: the place of its middle, where it faces, how high the middle is, and
+ * `cells` x `cells` cells, not 0 is white, row by row from the top. */
+typedef struct {
+    double x, y, cosine, sine, middle, cell;
+    int64_t cells;
+    const uint8_t *white;
+} sim_mark;
+
+enum { SIM_MOST_CELLS = 32 };
+
 /* What one column shows of one pole: rows top to bottom, and how bright. */
 typedef struct {
     uint16_t column, top, bottom;
@@ -129,10 +139,10 @@ typedef struct {
 size_t sim_join(const sim_piece *pieces, size_t count, const uint8_t *least, const sim_regions *all,
                 int32_t *order);
 
-/* An I420 picture of even width, at most SIM_WIDEST, and even height. `tables` are twice SIM_TABLE + SIM_WIDEST
+/* An I420 picture of even width, at most SIM_WIDEST, and even height. Of marks that overlap the last one is seen. `tables` are twice SIM_TABLE + SIM_WIDEST
  * bytes of noise, for luma and for chroma. */
 void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
-               const sim_noise *noise, const int8_t *tables, const sim_scratch *scratch,
+               const sim_mark *marks, size_t mark_count, const sim_noise *noise, const int8_t *tables, const sim_scratch *scratch,
                uint8_t *picture);
 
 #endif

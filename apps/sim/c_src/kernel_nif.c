@@ -7,6 +7,7 @@
 /* Nothing is further away than this, so that no cell number or row overflows. */
 #define WORLD 1.0e6
 #define MOST_BODIES 100000u
+#define MOST_MARKS 1000u
 
 enum { POLE_BYTES = 4 * sizeof(double) + 4 };
 
@@ -389,7 +390,36 @@ static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return answer(env, result);
 }
 
-/* paint(map, sight, poles, noise, tables) */
+/* [{x, y, cosine, sine, middle, cell, cells, white}], marks. */
+static int get_marks(ErlNifEnv *env, ERL_NIF_TERM list, sim_mark **marks, size_t *count)
+{
+    unsigned length;
+    ERL_NIF_TERM head;
+    const ERL_NIF_TERM *e;
+    ErlNifBinary white;
+
+    if (!enif_get_list_length(env, list, &length) || length > MOST_MARKS)
+        return 0;
+    *marks = enif_alloc((length + 1) * sizeof(sim_mark));
+    if (*marks == NULL)
+        return 0;
+    *count = length;
+    for (sim_mark *mark = *marks; enif_get_list_cell(env, list, &head, &list); mark++) {
+        ErlNifSInt64 cells;
+        if (!tuple(env, head, 8, &e) || !number(env, e[0], -WORLD, WORLD, &mark->x) ||
+            !number(env, e[1], -WORLD, WORLD, &mark->y) || !number(env, e[2], -1.1, 1.1, &mark->cosine) ||
+            !number(env, e[3], -1.1, 1.1, &mark->sine) || !number(env, e[4], -1000.0, 1000.0, &mark->middle) ||
+            !number(env, e[5], 1.0e-5, 100.0, &mark->cell) || !enif_get_int64(env, e[6], &cells) || cells < 1 ||
+            cells > SIM_MOST_CELLS || !enif_inspect_binary(env, e[7], &white) ||
+            white.size != (size_t)(cells * cells))
+            return 0;
+        mark->cells = cells;
+        mark->white = white.data;
+    }
+    return 1;
+}
+
+/* paint(map, sight, poles, marks, noise, tables) */
 static ERL_NIF_TERM paint(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
     sim_map map;
@@ -397,21 +427,23 @@ static ERL_NIF_TERM paint(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     sim_noise noise;
     sim_scratch scratch;
     ErlNifBinary tables;
-    size_t count = 0;
+    size_t count = 0, mark_count = 0;
     sim_pole *poles = NULL;
+    sim_mark *marks = NULL;
     void *memory = NULL;
     ERL_NIF_TERM result = 0;
 
-    if (argc == 5 && get_map(env, argv[0], &map) && get_sight(env, argv[1], &sight) &&
-        get_noise(env, argv[3], &noise) && enif_inspect_binary(env, argv[4], &tables) &&
-        tables.size == 2 * (SIM_TABLE + SIM_WIDEST) &&
+    if (argc == 6 && get_map(env, argv[0], &map) && get_sight(env, argv[1], &sight) &&
+        get_noise(env, argv[4], &noise) && enif_inspect_binary(env, argv[5], &tables) &&
+        tables.size == 2 * (SIM_TABLE + SIM_WIDEST) && get_marks(env, argv[3], &marks, &mark_count) &&
         (poles = get_poles(env, argv[2], &count)) != NULL &&
         (memory = get_scratch(&sight, count, &scratch)) != NULL) {
         size_t size = (size_t)(sight.width * sight.height / 2 * 3);
-        sim_paint(&map, &sight, poles, count, &noise, (const int8_t *)tables.data, &scratch,
+        sim_paint(&map, &sight, poles, count, marks, mark_count, &noise, (const int8_t *)tables.data, &scratch,
                   enif_make_new_binary(env, size, &result));
     }
     release(memory);
+    release(marks);
     release(poles);
     return answer(env, result);
 }
@@ -425,7 +457,7 @@ static ErlNifFunc functions[] = {
     {"scan_many", 4, scan, ERL_NIF_DIRTY_JOB_CPU_BOUND},
     {"look", 3, look, 0},
     {"join", 2, join, 0},
-    {"paint", 5, paint, 0},
+    {"paint", 6, paint, 0},
 };
 
 ERL_NIF_INIT(Elixir.Sim.Compute.Native, functions, NULL, NULL, NULL, NULL)

@@ -70,9 +70,9 @@ static uint8_t luma(const sim_sight *sight, const sim_pole *pole, double rx, dou
     return (uint8_t)clamped((int64_t)(pole->paint[0] * shade + 0.5), 0, 255);
 }
 
-static void ray(const sim_sight *sight, int64_t column, double *rx, double *ry)
+static void ray(const sim_sight *sight, double column, double *rx, double *ry)
 {
-    double k = ((double)(sight->width - 1) / 2 - (double)column) / sight->focal;
+    double k = ((double)(sight->width - 1) / 2 - column) / sight->focal;
     *rx = sight->cosine - sight->sine * k;
     *ry = sight->sine + sight->cosine * k;
 }
@@ -136,7 +136,7 @@ size_t sim_look(const sim_map *map, const sim_sight *sight, const sim_pole *pole
     for (int64_t column = first; column <= last; column++) {
         double rx, ry;
         int axis;
-        ray(sight, column, &rx, &ry);
+        ray(sight, (double)column, &rx, &ry);
         size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
         if (found > 0) {
             double far = scratch->hits[found - 1].depth;
@@ -206,8 +206,129 @@ static void put(const sim_sight *sight, const sim_piece *piece, const uint8_t *p
     }
 }
 
+/* Marks: SAMPLES x SAMPLES points of a pixel are looked at, or their cells would be found too well. */
+enum { SAMPLES = 4, WHITE = 225, BLACK = 30 };
+
+/* Nearer than this nothing is painted of a mark. */
+#define MARK_NEAREST 0.05
+/* From the side there is nothing to see. */
+#define MARK_EDGE 1.0e-6
+
+/* The columns and rows that a mark can cover; 0 if none. */
+static int mark_box(const sim_sight *sight, const sim_mark *mark, sim_span *columns, sim_span *rows)
+{
+    const double half = (double)mark->cells * mark->cell / 2, middle = (double)(sight->width - 1) / 2;
+    double left = FARTHEST * FARTHEST, right = -left, top = left, bottom = right;
+
+    for (int end = -1; end <= 1; end += 2) {
+        double dx = mark->x - end * half * mark->sine - sight->x;
+        double dy = mark->y + end * half * mark->cosine - sight->y;
+        double depth = sight->cosine * dx + sight->sine * dy;
+        double side = sight->cosine * dy - sight->sine * dx;
+        if (depth < MARK_NEAREST)
+            return 0;
+        double column = middle - sight->focal * (side / depth);
+        double upper = sight->horizon - sight->focal * ((mark->middle + half - sight->eye) / depth);
+        double lower = sight->horizon - sight->focal * ((mark->middle - half - sight->eye) / depth);
+        left = column < left ? column : left;
+        right = column > right ? column : right;
+        top = upper < top ? upper : top;
+        bottom = lower > bottom ? lower : bottom;
+    }
+    *columns = (sim_span){clamped(floored(left), 0, sight->width), clamped(ceiled(right), -1, sight->width - 1)};
+    *rows = (sim_span){clamped(floored(top), 0, sight->height), clamped(ceiled(bottom), -1, sight->height - 1)};
+    return 1;
+}
+
+/* The depth at which a ray meets the front of a mark's plane, negative where it does not. */
+static double front(const sim_sight *sight, const sim_mark *mark, double rx, double ry)
+{
+    double ahead = (mark->x - sight->x) * mark->cosine + (mark->y - sight->y) * mark->sine;
+    double along = rx * mark->cosine + ry * mark->sine;
+    return along < -MARK_EDGE && ahead < 0.0 ? ahead / along : -1.0;
+}
+
+/* The number of a cell, -1 beside the mark. */
+static int64_t cell(const sim_mark *mark, double at)
+{
+    return at >= 0.0 && at < (double)mark->cells ? (int64_t)at : -1;
+}
+
+static double sample(int k)
+{
+    return ((double)k - (double)(SAMPLES - 1) / 2) / SAMPLES;
+}
+
+/* The row above which a mark at this depth is not hidden by a pole; 0 if a wall hides all of it. */
+static int64_t unhidden(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
+                        int64_t column, double rx, double ry, double depth, const sim_scratch *scratch)
+{
+    int64_t above = sight->height;
+    int axis;
+
+    if (sim_wall(map, sight->x, sight->y, rx, ry, depth, &axis) < depth)
+        return 0;
+    size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
+    for (size_t k = 0; k < found && scratch->hits[k].depth < depth; k++) {
+        const sim_pole *pole = poles + scratch->hits[k].pole;
+        int64_t top =
+            ceiled(sight->horizon - sight->focal * (pole->height - sight->eye) / scratch->hits[k].depth);
+        above = top < above ? top : above;
+    }
+    return above;
+}
+
+static void put_mark(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
+                     const sim_mark *mark, const sim_scratch *scratch, uint8_t *picture)
+{
+    const int64_t width = sight->width, half = width / 2;
+    const double middle = (double)mark->cells / 2;
+    uint8_t *u = picture + width * sight->height, *v = u + half * (sight->height / 2);
+    sim_span columns, rows;
+
+    if (!mark_box(sight, mark, &columns, &rows))
+        return;
+    for (int64_t column = columns.first; column <= columns.last; column++) {
+        double rx, ry, depths[SAMPLES];
+        int64_t across[SAMPLES];
+        ray(sight, (double)column, &rx, &ry);
+        double depth = front(sight, mark, rx, ry);
+        if (depth < 0.0)
+            continue;
+        int64_t above = unhidden(map, sight, poles, count, column, rx, ry, depth, scratch);
+        for (int k = 0; k < SAMPLES; k++) {
+            ray(sight, (double)column + sample(k), &rx, &ry);
+            double d = depths[k] = front(sight, mark, rx, ry);
+            double x = sight->x + rx * d - mark->x, y = sight->y + ry * d - mark->y;
+            across[k] = d < 0.0 ? -1 : cell(mark, (y * mark->cosine - x * mark->sine) / mark->cell + middle);
+        }
+        for (int64_t row = rows.first; row <= rows.last && row < above; row++) {
+            int sum = 0, inside = 0;
+            for (int j = 0; j < SAMPLES; j++)
+                for (int k = 0; k < SAMPLES; k++) {
+                    if (across[k] < 0)
+                        continue;
+                    double height =
+                        sight->eye + (sight->horizon - ((double)row + sample(j))) * depths[k] / sight->focal;
+                    int64_t down = cell(mark, (mark->middle - height) / mark->cell + middle);
+                    if (down < 0)
+                        continue;
+                    sum += mark->white[down * mark->cells + across[k]] ? WHITE : BLACK;
+                    inside++;
+                }
+            if (inside == 0)
+                continue;
+            uint8_t *pixel = picture + row * width + column;
+            *pixel = (uint8_t)((sum + (SAMPLES * SAMPLES - inside) * *pixel + SAMPLES * SAMPLES / 2) /
+                               (SAMPLES * SAMPLES));
+            if (column % 2 == 0 && row % 2 == 0)
+                u[row / 2 * half + column / 2] = v[row / 2 * half + column / 2] = 128;
+        }
+    }
+}
+
 void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles, size_t count,
-               const sim_noise *noise, const int8_t *tables, const sim_scratch *scratch,
+               const sim_mark *marks, size_t mark_count, const sim_noise *noise, const int8_t *tables, const sim_scratch *scratch,
                uint8_t *picture)
 {
     const int64_t width = sight->width, height = sight->height;
@@ -221,7 +342,7 @@ void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles
     for (int64_t column = 0; column < width; column++) {
         double rx, ry;
         int axis;
-        ray(sight, column, &rx, &ry);
+        ray(sight, (double)column, &rx, &ry);
         double wall = sim_wall(map, sight->x, sight->y, rx, ry, FARTHEST, &axis);
         size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
         made = cut(sight, poles, found, wall, column, rx, ry, scratch, made);
@@ -239,6 +360,8 @@ void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles
     memset(picture + width * height, 128, (size_t)(width * height / 2));
     for (size_t k = 0; k < made; k++)
         put(sight, scratch->pieces + k, paints[scratch->pieces[k].kind], picture);
+    for (size_t k = 0; k < mark_count; k++)
+        put_mark(map, sight, poles, count, marks + k, scratch, picture);
     if (noise->on) {
         const int8_t *chroma = tables + SIM_TABLE + SIM_WIDEST;
         uint8_t *u = picture + width * height, *v = u + width * height / 4;

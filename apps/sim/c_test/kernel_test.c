@@ -150,7 +150,24 @@ static void pictures(const sim_map *map, const int8_t *tables)
         const sim_piece *piece = scratch.pieces + k;
         CHECK(piece->column < width && piece->top <= piece->bottom && piece->bottom < height);
     }
-    sim_paint(map, &sight, poles, count, &noise, tables, &scratch, picture);
+    size_t mark_count = draw() % 4;
+    sim_mark *marks = exactly(mark_count * sizeof *marks);
+    for (size_t k = 0; k < mark_count; k++) {
+        int64_t cells = upto(12);
+        uint8_t *white = exactly((size_t)(cells * cells));
+        for (int64_t n = 0; n < cells * cells; n++)
+            white[n] = draw() % 2;
+        /* Anywhere, or right before the camera. */
+        double reach = draw() % 2 ? 1.0 : 100.0;
+        marks[k] = (sim_mark){sight.x + place(map->width, map->cell) / reach,
+                              sight.y + place(map->height, map->cell) / reach, 1.0, 0.0, unit() * 2,
+                              0.001 + unit() / 4, cells, white};
+        direction(&marks[k].cosine, &marks[k].sine);
+    }
+    sim_paint(map, &sight, poles, count, marks, mark_count, &noise, tables, &scratch, picture);
+    for (size_t k = 0; k < mark_count; k++)
+        free((uint8_t *)marks[k].white);
+    free(marks);
     free(poles);
     free(scratch.hits);
     free(scratch.spans);

@@ -9,6 +9,7 @@ defmodule Console.About do
   alias Robot.Percept.Snapshot
   alias Swarm.{Member, Status}
   alias Swarm.Status.{Sight, Words}
+  alias Vision.Mark
 
   @typedoc """
   `wishes` are all behaviours that wished, with their weights, the chosen one first; `way` are the corners of the way that
@@ -223,10 +224,17 @@ defmodule Console.About do
     %{sonar: sonar, cone: body.sonar_cone / 2}
   end
 
-  defp seen({%{blobs: [first | _] = blobs}, _age_ms}) do
-    boxes = for blob <- blobs, do: [blob.colour, blob.left, blob.top, blob.right, blob.bottom]
-    %{width: first.width, height: first.height, boxes: boxes}
+  defp seen({%{blobs: blobs, marks: marks}, _age_ms}) do
+    found =
+      for(blob <- blobs, do: {blob, [blob.colour, blob.left, blob.top, blob.right, blob.bottom]}) ++
+        for mark <- marks || [], do: {mark, [Mark.name(mark) | Tuple.to_list(Mark.box(mark))]}
+
+    with [{first, _box} | _] <- found do
+      %{width: first.width, height: first.height, boxes: for({_found, box} <- found, do: box)}
+    else
+      [] -> nil
+    end
   end
 
-  defp seen(_nothing), do: nil
+  defp seen(nil), do: nil
 end

@@ -85,6 +85,51 @@ defmodule Console.AboutTest do
     assert About.json(:about3, about) =~ ~s("by":"follow")
   end
 
+  test "what its camera has found is told as boxes, blobs and marks" do
+    blob = %Vision.Blob{
+      colour: "Red",
+      area: 4,
+      share: 0.1,
+      x: 1.0,
+      y: 1.0,
+      left: 0,
+      top: 1,
+      right: 2,
+      bottom: 3,
+      width: 64,
+      height: 48
+    }
+
+    mark = %Vision.Mark{
+      family: :tag36h11,
+      id: 7,
+      at_ms: 0,
+      x: 15.0,
+      y: 10.0,
+      corners: [{10.2, 5.0}, {20.7, 5.5}, {20.5, 15.9}, {10.0, 15.0}],
+      width: 64,
+      height: 48
+    }
+
+    board = board(:about6, [])
+
+    for {blobs, marks, boxes} <- [
+          {[blob], nil, [["Red", 0, 1, 2, 3]]},
+          {[blob], [mark], [["Red", 0, 1, 2, 3], ["tag36h11 7", 10, 5, 21, 16]]},
+          {[], [mark], [["tag36h11 7", 10, 5, 21, 16]]}
+        ] do
+      now = Board.now(board)
+      seen = %Vision.Detections{at_ms: now, blobs: blobs, marks: marks}
+      Board.put(board, :blob_detector, :detections, seen, now)
+      assert %{width: 64, height: 48, boxes: ^boxes} = About.of(:about6).seen
+    end
+
+    now = Board.now(board)
+    nothing = %Vision.Detections{at_ms: now, blobs: [], marks: []}
+    Board.put(board, :blob_detector, :detections, nothing, now)
+    assert About.of(:about6).seen == nil
+  end
+
   test "what is older than a second is not of now, and a robot that is gone has nothing to tell" do
     board = board(:about4, [])
     Board.put(board, :drive, :odometry, driving(), Board.now(board) - 1_500)

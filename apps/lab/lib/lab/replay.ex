@@ -54,7 +54,8 @@ defmodule Lab.Replay do
     at_ms = Record.Replay.Member.at_ms(input)
     replay = replay |> advance(at_ms) |> settle(input)
     {trial, decided} = decide(replay.trial, id, input, effects, at_ms)
-    differences = decided ++ sensed(replay.trial, id, input, at_ms) ++ differences
+    {sensed, trial} = sensed(trial, replay.trial, id, input, at_ms)
+    differences = decided ++ sensed ++ differences
     same = if decided == [], do: length(effects), else: 0
     counts = %{inputs: replay.inputs + 1, decisions: replay.decisions + same}
     {Map.merge(%{replay | trial: trial}, counts), differences}
@@ -95,16 +96,18 @@ defmodule Lab.Replay do
     end
   end
 
-  defp sensed(trial, id, input, at_ms) do
+  # By the world before the robot decided.
+  defp sensed(decided, before, id, input, at_ms) do
     case input do
       {:reading, {key, _value} = reading, _at_ms} ->
-        same(reading, List.keyfind(Mechanics.readings(trial, id), key, 0), id, at_ms)
+        {same(reading, List.keyfind(Mechanics.readings(before, id), key, 0), id, at_ms), decided}
 
       {:detections, detections} ->
-        same(detections, Mechanics.detections(trial, id), id, at_ms)
+        {seen, %{schedules: schedules}} = Mechanics.look(before, id)
+        {same(detections, seen, id, at_ms), %{decided | schedules: schedules}}
 
       _not_of_the_world ->
-        []
+        {[], decided}
     end
   end
 

@@ -26,11 +26,12 @@ defmodule Lab.Trial do
 
   @enforce_keys [:options, :map, :world, :radio, :members, :script, :run_log, :colours]
   defstruct @enforce_keys ++
-              [at_ms: 0, faults: %Faults{}, severed: nil, entries: nil, answers: %{}]
+              [at_ms: 0, faults: %Faults{}, severed: nil, entries: nil, answers: %{}] ++
+              [marks: nil, schedules: %{}]
 
   @typedoc """
   `entries` holds what happened since it was last taken, newest first; `nil`: not recorded. `answers` are those of robots to
-  the last order.
+  the last order. `marks` are what their cameras look for, and `schedules` where each last did.
   """
   @type t :: %__MODULE__{
           at_ms: non_neg_integer(),
@@ -95,8 +96,16 @@ defmodule Lab.Trial do
       members: members,
       script: Script.new(options.moves, options.kills, options.script),
       run_log: RunLog.new(elem(setup.mission, 0)),
-      colours: World.colours()
+      colours: World.colours(),
+      marks: marks(options)
     }
+  end
+
+  defp marks(%{marks: nil}), do: nil
+
+  defp marks(options) do
+    {:ok, marks} = Vision.Marks.new(Setup.looked_for(options))
+    marks
   end
 
   @doc "What was recorded since the last call, oldest first."
@@ -259,9 +268,11 @@ defmodule Lab.Trial do
       if not World.camera?(trial.world, id) or
            Faults.any?(trial.faults, [:blind], id, trial.at_ms),
          do: trial,
-         else: input(trial, id, {:detections, Mechanics.detections(trial, id, scenery)})
+         else: looked(Mechanics.look(trial, id, scenery), id)
     end)
   end
+
+  defp looked({detections, trial}, id), do: input(trial, id, {:detections, detections})
 
   defp inputs(trial, make),
     do: each(trial, fn id, trial -> input(trial, id, make.(trial.at_ms)) end)

@@ -15,7 +15,7 @@ defmodule Lab.VirtualRobot do
 
   @typedoc """
   What all robots of a fleet have in common: the name of their world, their clock and radio, the
-  kind of blobs, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
+  kind of blobs, the marks that they look for, their mission, the walls that they know, the trace of inputs and outputs (`{m, f, a}`, called with the id
   first), and the run's folder, which holds the serial
   lines of robots with real drivers.
   """
@@ -24,6 +24,7 @@ defmodule Lab.VirtualRobot do
           clock: Robot.Config.call(),
           transport: Robot.Config.call(),
           blobs: :painted | :direct,
+          marks: keyword() | nil,
           mission: Robot.Config.module_options(),
           plan: Elixir.Nav.Grid.t() | Elixir.Nav.OccupancyGrid.t() | nil,
           trace: Robot.Config.call() | nil,
@@ -169,6 +170,7 @@ defmodule Lab.VirtualRobot do
         start: robot.start,
         clock: common.clock,
         colours: World.colours(),
+        marks: robot.profile.camera && common.marks,
         mission: common.mission,
         plan: common.plan,
         replace: true,

@@ -56,6 +56,11 @@ defmodule Lab.ReplayTest do
 
   defp steps(entries), do: Enum.count(entries, &match?({:step, _, _, _}, &1))
 
+  @tag skip: with({:error, line} <- Vision.Marks.available(), do: line, else: (:ok -> false))
+  test "a run with marks in it replays to the byte" do
+    same([marks: [size: 0.3, at: [{3, {1.5, 0.0, 180}}, {8, {0.0, 1.5, -90}}]]], 60)
+  end
+
   test "a run replays to the byte: world, robots, scene and report" do
     same([moves: [{{2, 1}, 12}], kills: [{:leader, 15}], loss: 0.1], 250)
   end

@@ -9,6 +9,7 @@ defmodule Robot.Config do
     * `:start` - its pose when it is switched on, in the `map` frame; `%Hal.Pose{}`, default the
       origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
+    * `:marks` - the printed marks that the camera looks for, options of `Vision.Marks`, or `nil` (the default) for none
     * `:save_pictures` - where and how the camera's pictures are saved, options of `Vision.Saver`,
       or `nil` (the default)
     * `:limits` - values that replace those of the profile and may not exceed them, such as
@@ -58,6 +59,7 @@ defmodule Robot.Config do
                 scan: nil,
                 start: Pose.new(0, 0),
                 colours: nil,
+                marks: nil,
                 save_pictures: nil,
                 limits: [],
                 mission: nil,
@@ -91,6 +93,7 @@ defmodule Robot.Config do
           scan: module_options() | nil,
           start: Pose.t(),
           colours: struct() | nil,
+          marks: keyword() | nil,
           save_pictures: keyword() | nil,
           limits: keyword(),
           mission: module_options() | nil,
@@ -164,6 +167,7 @@ defmodule Robot.Config do
       scan: [:driver, default: nil],
       start: {:struct, Pose},
       colours: [{:struct, Vision.Colours}, default: nil],
+      marks: [{:keys, Vision.Marks.table()}, default: nil],
       save_pictures: [{:keys, Vision.Saver.Options.table()}, default: nil],
       limits: {:keys, @limits},
       mission: [:driver, default: nil],
@@ -200,6 +204,9 @@ defmodule Robot.Config do
 
   defp check(%{camera: nil, save_pictures: [_ | _]}),
     do: {:error, "robot option save_pictures is for a robot with a camera"}
+
+  defp check(%{camera: nil, marks: [_ | _]}),
+    do: {:error, "robot option marks is for a robot with a camera"}
 
   defp check(%{colours: nil, camera: {_driver, _options}}),
     do: {:error, "robot option colours: expected those of the camera, got nil"}

@@ -3,7 +3,7 @@ defmodule Robot.Devices do
   Supervises a robot's sensors and actuators, each of which is restarted alone:
 
       Robot.Devices (one_for_one)
-      |-- Vision.BlobDetector  the newest frame to blobs (only with a camera)
+      |-- Vision.BlobDetector  the newest frame to blobs and marks (only with a camera)
       |-- Vision.View          frames to pictures while there is a viewer (only with a camera)
       |-- Vision.Saver         keeps such pictures in a folder (only if told to)
       |-- Robot.Devices.Speech says aloud what becomes of the robot (only if told to)
@@ -93,11 +93,20 @@ defmodule Robot.Devices do
     [
       {Vision.BlobDetector,
        colours: config.colours,
+       marks: marks(config),
        sink: sink,
        ptz: config.ptz != nil,
        clock: config.clock,
        name: Names.via(config.id, :blob_detector)}
     ]
+  end
+
+  defp marks(%Robot.Config{marks: nil}), do: nil
+
+  # The options have been checked.
+  defp marks(%Robot.Config{marks: options}) do
+    {:ok, marks} = Vision.Marks.new(options)
+    marks
   end
 
   defp view(%Robot.Config{camera: nil}, _demand), do: []

@@ -28,6 +28,7 @@ defmodule Robot.File do
                 camera: nil,
                 scan: nil,
                 colours: nil,
+                marks: nil,
                 save_pictures: nil,
                 limits: [],
                 start: nil,
@@ -54,6 +55,7 @@ defmodule Robot.File do
           camera: Robot.Config.module_options() | nil,
           scan: Robot.Config.module_options() | nil,
           colours: struct() | nil,
+          marks: keyword() | nil,
           save_pictures: keyword() | nil,
           limits: keyword(float()),
           start: Pose.t(),
@@ -80,6 +82,7 @@ defmodule Robot.File do
     :camera,
     :scan,
     :colours,
+    :marks,
     :save_pictures,
     :limits,
     :start,
@@ -201,6 +204,7 @@ defmodule Robot.File do
         named(robot, file),
         seen(robot),
         scanned(robot),
+        marked(robot),
         kept(robot),
         placed(robot),
         shared(robot),
@@ -235,6 +239,11 @@ defmodule Robot.File do
     do: {["scan"], "is for a body with a lidar, and #{body.name} has none: body: [scan: […]]"}
 
   defp scanned(_robot), do: nil
+
+  defp marked(%{marks: marks, camera: nil}) when marks != nil,
+    do: {["marks"], "is for a robot with a camera, and it has none"}
+
+  defp marked(_robot), do: nil
 
   defp kept(%{save_pictures: nil}), do: nil
 

@@ -105,6 +105,37 @@ defmodule Robot.FileTest do
     assert {:ok, %{fence: nil, dry_run: false, replace: false}} = parse("fence: nil")
   end
 
+  test "marks to look for" do
+    camera = ~s(camera: {Hal.Camera.FFmpeg, source: "testsrc"}, colours: "landmark.txt")
+    marks = "marks: [family: :tagStandard41h12, size: 1]"
+    assert {:ok, robot} = parse("#{camera}, #{marks}", colours: colours())
+    assert robot.marks == [family: :tagStandard41h12, size: 1.0]
+    assert {:ok, %{marks: [family: :tagStandard41h12, size: 1.0]}} = Robot.File.config(robot)
+    assert {:ok, %{marks: nil}} = parse(camera, colours: colours())
+
+    for {shorter, words} <- [
+          {robot, "tagStandard41h12, 1.00 m between their corners"},
+          {%{robot | marks: [size: 0.16]}, "tag36h11, 0.16 m between their corners"}
+        ],
+        do: assert(Enum.any?(Robot.File.Summary.lines(shorter), &(&1 =~ words)))
+
+    assert lines("#{camera}, marks: [family: :tag36h10, sice: 1]", colours: colours()) == [
+             "mag1.exs:2: marks.sice: is not known: allowed are family, size; did you mean size?",
+             "mag1.exs:2: marks.family: expected :tag36h11 or :tagStandard41h12, got :tag36h10; did you mean :tag36h11?",
+             "mag1.exs:2: marks.size: is missing: expected a number from 0.01 to 10.0 m"
+           ]
+
+    assert lines(marks) == ["mag1.exs:2: marks: is for a robot with a camera, and it has none"]
+
+    # Where the library is missing, a person is told.
+    warned = Enum.filter(Robot.File.Warnings.lines(robot, fn _ -> true end), &(&1 =~ "marks"))
+
+    case Vision.Marks.available() do
+      :ok -> assert warned == []
+      {:error, line} -> assert warned == ["marks: #{line}; without it this robot sees none"]
+    end
+  end
+
   test "pictures to keep" do
     camera = ~s(camera: {Hal.Camera.FFmpeg, source: "testsrc"}, colours: "landmark.txt")
     keep = ~s(save_pictures: [folder: "/tmp/pictures", rate: 2, files: 10])

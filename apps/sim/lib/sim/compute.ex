@@ -104,12 +104,19 @@ defmodule Sim.Compute do
 
   @doc """
   The bytes of an I420 picture. Noise is N(0, 3) for luma, N(0, 2) for chroma, and salt: one luma in
-  a thousand is white or black.
+  a thousand is white or black. Marks are flat, stand upright, and hide each other by their distance.
   """
-  @spec paint(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()] | binary(), noise()) ::
-          binary()
-  def paint(map, %CameraFrustum{} = sight, poles, noise),
-    do: module().paint(pack(map), pack(sight), pack(poles), narrow(noise), tables())
+  @spec paint(
+          Sim.Floorplan.t(),
+          CameraFrustum.t(),
+          [CameraFrustum.pole()] | binary(),
+          [Sim.Compute.Marks.packed()],
+          noise()
+        ) :: binary()
+  def paint(map, %CameraFrustum{} = sight, poles, marks, noise) do
+    marks = Compute.Marks.sort(marks, {sight.x, sight.y})
+    module().paint(pack(map), pack(sight), pack(poles), marks, narrow(noise), tables())
+  end
 
   # A picture's noise: sd 3 for luma, 2 for chroma. A row starts anywhere in the first @table draws.
   @tables (for {sd, use} <- [{3, 0}, {2, 1}], k <- 0..(@table + @widest - 1), into: <<>> do

@@ -23,6 +23,7 @@ defmodule Sim.World do
     map: [{:struct, Floorplan}, required: true],
     robots: [{:check, &is_list/1, "a list of robots"}, required: true],
     landmark: [{:check, &is_tuple/1, "{x, y} in metres"}, default: nil],
+    marks: [{:list, {:check, &Keyword.keyword?/1, "[id: 3, pose: pose]"}}, default: []],
     seed: [:integer, default: 0],
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
     start_ms: [:integer, default: 0]
@@ -33,6 +34,7 @@ defmodule Sim.World do
               [
                 step: 0,
                 landmark: nil,
+                marks: [],
                 goal: nil,
                 collisions: 0,
                 contacts: [],
@@ -54,6 +56,7 @@ defmodule Sim.World do
           robots: %{id() => Body.t()},
           step: non_neg_integer(),
           landmark: Pose.point() | nil,
+          marks: [World.Mark.t()],
           goal: Pose.point() | nil,
           collisions: non_neg_integer(),
           contacts: [contact()],
@@ -64,7 +67,8 @@ defmodule Sim.World do
   @doc """
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
   reading of the wheels (0, 0, 0 unless given), `infrared: true` for a robot with such sensors,
-  `wheels:` for errors of its odometry (`Sim.World.Body`). Wrong options raise `ArgumentError`.
+  `wheels:` for errors of its odometry (`Sim.World.Body`). `:marks` are printed marks, by the options of
+  `Sim.World.Mark.new!/1`; cameras see them in painted pictures. Wrong options raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -87,6 +91,7 @@ defmodule Sim.World do
       noise: noise,
       at_ms: options[:start_ms],
       order: ids,
+      marks: Enum.map(options[:marks], &World.Mark.new!/1),
       robots: Elixir.Map.new(bodies, &{&1.id, &1})
     }
     |> place_landmark(options[:landmark])
@@ -230,7 +235,7 @@ defmodule Sim.World do
       format: :i420,
       width: sight.width,
       height: sight.height,
-      bytes: Compute.paint(world.map, sight, others(world, body, scenery), noise),
+      bytes: Compute.paint(world.map, sight, others(world, body, scenery), marks(world), noise),
       at_ms: world.at_ms,
       pan: body.pan,
       tilt: body.tilt,
@@ -249,6 +254,8 @@ defmodule Sim.World do
   @doc "Whether a robot is alive."
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
+
+  defp marks(world), do: for(mark <- world.marks, do: mark.packed)
 
   # Everything upright that robot `id` can see.
   defp poles(%__MODULE__{} = world, id) do

@@ -94,6 +94,20 @@ defmodule Sim.ComputeTest do
     end
   end
 
+  # Some are near the camera, so that pictures are full of them.
+  defp marks(map, sight, count) do
+    for _ <- 1..count//1 do
+      {x, y} = place(map)
+      {c, s} = direction()
+      reach = Enum.random([1, 30])
+      cells = :rand.uniform(11)
+      white = for _ <- 1..(cells * cells), into: <<>>, do: <<:rand.uniform(2) - 1>>
+
+      {elem(sight, 0) + x / reach, elem(sight, 1) + y / reach, c, s, :rand.uniform() * 1.5,
+       0.01 + :rand.uniform() / 5, cells, white}
+    end
+  end
+
   test "the library is loaded" do
     assert Compute.Native.loaded?()
   end
@@ -250,8 +264,9 @@ defmodule Sim.ComputeTest do
     for _ <- 1..60 do
       map = map(plan())
       {sight, poles, noise} = {sight(map), poles(map, :rand.uniform(9) - 1), noise()}
-      picture = Compute.Native.paint(map, sight, poles, noise, Compute.tables())
-      assert picture == Reference.paint(map, sight, poles, noise, Compute.tables())
+      marks = marks(map, sight, :rand.uniform(5) - 1)
+      picture = Compute.Native.paint(map, sight, poles, marks, noise, Compute.tables())
+      assert picture == Reference.paint(map, sight, poles, marks, noise, Compute.tables())
       {width, height} = {elem(sight, 7), elem(sight, 8)}
       assert {:ok, byte_size(picture)} == Hal.Frame.byte_size(:i420, width, height)
     end
@@ -302,8 +317,22 @@ defmodule Sim.ComputeTest do
     badarg.(fn -> Compute.Native.look(map, put_elem(sight, 7, 5000), <<>>) end)
     badarg.(fn -> Compute.Native.look(map, put_elem(sight, 8, 3), <<>>) end)
     badarg.(fn -> Compute.Native.look(map, sight, <<0::288>>) end)
-    badarg.(fn -> Compute.Native.paint(map, sight, <<>>, nil, <<tables::binary, 0>>) end)
-    badarg.(fn -> Compute.Native.paint(map, put_elem(sight, 5, 0.0), <<>>, nil, tables) end)
+    badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [], nil, <<tables::binary, 0>>) end)
+    badarg.(fn -> Compute.Native.paint(map, put_elem(sight, 5, 0.0), <<>>, [], nil, tables) end)
+    mark = {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 2, <<0, 1, 1, 0>>}
+
+    for wrong <- [
+          :no,
+          put_elem(mark, 0, 1.0e9),
+          put_elem(mark, 2, 2.0),
+          put_elem(mark, 5, 0.0),
+          put_elem(mark, 6, 3),
+          {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 33, :binary.copy(<<0>>, 33 * 33)}
+        ],
+        do: badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [mark, wrong], nil, tables) end)
+
+    badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [mark] ++ :tail, nil, tables) end)
+    assert is_binary(Compute.Native.paint(map, sight, <<>>, [mark], nil, tables))
     assert Compute.Native.look(map, sight, <<>>) == <<>>
   end
 

@@ -1,6 +1,6 @@
 defmodule Vision.BlobDetector do
   @moduledoc """
-  Finds blobs in frames, in a process of its own. It works on the newest frame only: it drops older ones that wait in
+  Finds blobs, and marks if it is told to, in frames, in a process of its own. It works on the newest frame only: it drops older ones that wait in
   its mailbox, so it does not lag behind its camera.
 
   Options:
@@ -9,6 +9,8 @@ defmodule Vision.BlobDetector do
     * `:sink` - `{m, f, a}`; for each frame that was read it calls
       `apply(m, f, a ++ [{:detections, detections}])` with the frame's `Vision.Detections`, even
       if there are no blobs
+    * `:marks` - the `Vision.Marks` to look for; `nil` (the default) for none. Without the library
+      (`Vision.Marks.available/0`) the detections have none, and `status/1` says why
     * `:backend` - a `Vision.Backend`; by default the one that `Vision.blobs/4` selects
     * `:ptz` - `true`: the camera is on a pan-tilt unit, whose readings are passed to `aim/2`
     * `:clock` - `{m, f, a}` that returns integer milliseconds, by the clock of the frames
@@ -27,7 +29,7 @@ defmodule Vision.BlobDetector do
   """
   use GenServer
   alias Hal.{Frame, Ptz}
-  alias Vision.{Colours, Detections, Filter}
+  alias Vision.{Colours, Detections, Filter, Marks}
 
   defguardp is_aim(reading)
             when is_map(reading) and is_number(reading.pan) and is_number(reading.tilt) and
@@ -37,7 +39,8 @@ defmodule Vision.BlobDetector do
           read: non_neg_integer(),
           dropped: non_neg_integer(),
           wrong: non_neg_integer(),
-          last_error: term()
+          last_error: term(),
+          marks: :none | :ok | {:error, line :: String.t()}
         }
 
   @doc "Starts the blob detector. Wrong options raise `ArgumentError`."
@@ -65,7 +68,7 @@ defmodule Vision.BlobDetector do
 
   @doc """
   How many frames were read, how many were dropped for a newer one, how many were wrong, and the
-  last error.
+  last error; whether marks are looked for.
   """
   @spec status(GenServer.server()) :: status()
   def status(detector), do: GenServer.call(detector, :status)
@@ -76,7 +79,13 @@ defmodule Vision.BlobDetector do
     scratch = Vision.scratch(options[:colours], options[:backend])
 
     {:ok,
-     Map.merge(Map.new(options), %{counts: counts, aim: Ptz.History.new(), scratch: scratch})}
+     Map.merge(Map.new(options), %{
+       counts: counts,
+       aim: Ptz.History.new(),
+       scratch: scratch,
+       detector: options[:marks] && Marks.detector(options[:marks]),
+       schedule: %Marks.Schedule{}
+     })}
   end
 
   @impl GenServer
@@ -86,12 +95,14 @@ defmodule Vision.BlobDetector do
     {frame, dropped} = newest(frame, 0)
     state = state |> count(:dropped, dropped) |> newest_aim()
 
-    with {:ok, frame} <- direct(frame, state), {:ok, blobs} <- read(frame, state) do
+    with {:ok, frame} <- direct(frame, state),
+         {:ok, blobs} <- read(frame, state),
+         {:ok, marks, schedule} <- marks(frame, state) do
       # A backend may be anybody's.
       blobs = Filter.real(blobs, {frame.width, frame.height})
       {m, f, a} = state.sink
-      apply(m, f, a ++ [{:detections, Detections.new(frame, blobs)}])
-      {:noreply, count(state, :read, 1)}
+      apply(m, f, a ++ [{:detections, Detections.new(frame, blobs, marks)}])
+      {:noreply, count(%{state | schedule: schedule}, :read, 1)}
     else
       {:error, reason} ->
         {:noreply, state |> count(:wrong, 1) |> put_in([:counts, :last_error], reason)}
@@ -99,7 +110,16 @@ defmodule Vision.BlobDetector do
   end
 
   @impl GenServer
-  def handle_call(:status, _from, state), do: {:reply, state.counts, state}
+  def handle_call(:status, _from, state) do
+    marks =
+      case state.detector do
+        nil -> :none
+        {:ok, _detector} -> :ok
+        error -> error
+      end
+
+    {:reply, Map.put(state.counts, :marks, marks), state}
+  end
 
   # Frames that have come in the meantime are further down in the mailbox.
   defp newest(frame, dropped) do
@@ -137,6 +157,11 @@ defmodule Vision.BlobDetector do
 
   defp read(_other, _state), do: {:error, :no_frame}
 
+  defp marks(frame, %{detector: {:ok, detector}} = state),
+    do: Marks.look(state.marks, detector, state.schedule, frame)
+
+  defp marks(_frame, state), do: {:ok, nil, state.schedule}
+
   defp count(state, what, n), do: update_in(state, [:counts, what], &(&1 + n))
 
   defp check!(options) do
@@ -145,6 +170,7 @@ defmodule Vision.BlobDetector do
         :colours,
         :sink,
         backend: nil,
+        marks: nil,
         ptz: false,
         clock: {System, :monotonic_time, [:millisecond]}
       ])
@@ -154,6 +180,9 @@ defmodule Vision.BlobDetector do
 
     unless match?(%Colours{}, options[:colours]),
       do: raise(ArgumentError, "blob detector option colours: expected a %Vision.Colours{}")
+
+    unless options[:marks] == nil or match?(%Marks{}, options[:marks]),
+      do: raise(ArgumentError, "blob detector option marks: expected a %Vision.Marks{}")
 
     case options[:sink] do
       {m, f, a} when is_atom(m) and is_atom(f) and is_list(a) ->

@@ -13,6 +13,7 @@ defmodule Lab.Fleet.Local do
   alias Robot.Names
   alias Hal.Event
   alias Lab.Fleet.Folder
+  alias Lab.Trial.Setup
   alias Lab.VirtualRobot
   alias Lab.VirtualRobot.Hardware
   alias Lab.RadioServer
@@ -43,6 +44,7 @@ defmodule Lab.Fleet.Local do
       clock: VirtualRobot.clock(),
       transport: transport,
       blobs: setup.options.blobs,
+      marks: Setup.looked_for(setup.options),
       mission: setup.mission,
       plan: setup.plan,
       trace: options[:trace],

@@ -211,6 +211,7 @@ defmodule Lab.Fleet.Nodes do
        robot: Enum.at(setup.robots, index),
        world: backend.name,
        blobs: options.blobs,
+       marks: Lab.Trial.Setup.looked_for(options),
        mission: setup.mission,
        plan: setup.plan,
        folder: backend.host.home,

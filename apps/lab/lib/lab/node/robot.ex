@@ -9,7 +9,7 @@ defmodule Lab.Node.Robot do
       |-- Lab.VirtualRobot.Hardware  emulated devices, if it has the real drivers
       `-- supervisor (one_for_one)  what else the fleet wants to run beside the robot
 
-  Options: `robot` as in `Lab.Trial.Setup`, `world`, `blobs`, `mission`, `plan`, `folder` as in
+  Options: `robot` as in `Lab.Trial.Setup`, `world`, `blobs`, `marks`, `mission`, `plan`, `folder` as in
   `Lab.VirtualRobot`, `radio` as `Lab.RadioServer.parts/2` takes it; `line`, the path of `Sim.World.Line`;
   `beside`, more children; `restart: :permanent` for a robot that is started again for ever, as in a release.
   """
@@ -23,7 +23,10 @@ defmodule Lab.Node.Robot do
   @impl Lab.Node
   def start(options) do
     id = options.robot.id
-    options = Map.merge(%{line: nil, beside: [], restart: :temporary, plan: nil}, options)
+
+    options =
+      Map.merge(%{line: nil, beside: [], restart: :temporary, plan: nil, marks: nil}, options)
+
     options = Map.put_new(options, :radio, %{seed: 0})
 
     children =
@@ -41,6 +44,7 @@ defmodule Lab.Node.Robot do
       clock: VirtualRobot.clock(),
       transport: transport,
       blobs: options.blobs,
+      marks: options.marks,
       mission: options.mission,
       plan: options.plan,
       trace: nil,

@@ -8,7 +8,7 @@ defmodule Lab.Trial.Mechanics do
   alias Lab.Trial.{Cuts, Evaluation, Faults, Memory, RunLog}
   alias Swarm.Member
   alias Swarm.Message.Checked
-  alias Vision.Detections
+  alias Vision.{Detections, Marks}
 
   @half_ms 50
 
@@ -21,6 +21,8 @@ defmodule Lab.Trial.Mechanics do
           :members => %{atom() => Member.t()},
           :run_log => RunLog.t(),
           :colours => Vision.Colours.t(),
+          :marks => Marks.t() | nil,
+          :schedules => %{atom() => Marks.Schedule.t()},
           :faults => Faults.t(),
           optional(atom()) => term()
         }
@@ -88,19 +90,28 @@ defmodule Lab.Trial.Mechanics do
   def readings(trial, id), do: World.readings(trial.world, id)
 
   @doc """
-  What a robot's camera shows now: in a painted picture, or by geometry, as the options say; with what all cameras can see
+  What a robot's camera shows now, and the trial after it has looked: in a painted picture, or by geometry, as the options say; with what all cameras can see
   (`Sim.World.scenery/1`), or without, for one robot alone.
   """
-  @spec detections(trial(), atom(), World.scenery() | nil) :: Detections.t()
-  def detections(trial, id, scenery \\ nil)
+  @spec look(trial(), atom(), World.scenery() | nil) :: {Detections.t(), trial()}
+  def look(trial, id, scenery \\ nil)
 
-  def detections(%{options: %{blobs: :direct}} = trial, id, scenery),
-    do: World.detections(trial.world, id, scenery)
+  def look(%{options: %{blobs: :direct}} = trial, id, scenery),
+    do: {World.detections(trial.world, id, scenery), trial}
 
-  def detections(trial, id, scenery) do
+  def look(trial, id, scenery) do
     frame = World.frame(trial.world, id, scenery)
     {:ok, blobs} = Vision.blobs(frame, trial.colours, nil, Memory.scratch())
-    Detections.new(frame, blobs)
+    {marks, trial} = marks(trial, id, frame)
+    {Detections.new(frame, blobs, marks), trial}
+  end
+
+  defp marks(%{marks: nil} = trial, _id, _frame), do: {nil, trial}
+
+  defp marks(%{marks: marks, schedules: schedules} = trial, id, frame) do
+    schedule = Map.get(schedules, id, %Marks.Schedule{})
+    {:ok, seen, schedule} = Marks.look(marks, Memory.detector(marks), schedule, frame)
+    {seen, %{trial | schedules: Map.put(schedules, id, schedule)}}
   end
 
   @doc "The picture that a robot's camera takes now."

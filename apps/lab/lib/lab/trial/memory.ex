@@ -27,6 +27,16 @@ defmodule Lab.Trial.Memory do
     :ok
   end
 
+  @doc "A detector for marks, which the calling process keeps, too."
+  @spec detector(Vision.Marks.t()) :: Vision.Marks.Native.detector()
+  def detector(%Vision.Marks{family: family} = marks) do
+    with nil <- Process.get({__MODULE__, family}) do
+      {:ok, detector} = Vision.Marks.detector(marks)
+      _none = Process.put({__MODULE__, family}, detector)
+      detector
+    end
+  end
+
   @doc "The scratch of the calling process; `nil` if it has not been prepared."
   @spec scratch() :: Vision.scratch()
   def scratch, do: Process.get(__MODULE__)

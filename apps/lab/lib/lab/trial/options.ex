@@ -72,6 +72,7 @@ defmodule Lab.Trial.Options do
       grey: [{:one_of, [:wall, :floor]}, default: :wall],
       start: [{:one_of, [:spread, :same]}, default: :spread],
       landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
+      marks: [{:or, nil, {:keys, marks()}}, default: nil],
       moves: [{:check, &moves?/1, "[{{x, y}, at_s}]"}, default: []],
       kills: [{:check, &kills?/1, "[{robot, at_s}]"}, default: []],
       script: [Event.script_type(), default: []],
@@ -89,6 +90,22 @@ defmodule Lab.Trial.Options do
         default: []
       ]
     ]
+  end
+
+  # Where each hangs, and where it faces: in metres and degrees.
+  defp marks do
+    place = List.duplicate({:number, -1.0e4, 1.0e4}, 3)
+
+    Vision.Marks.table()
+    |> Keyword.merge(
+      height: {:number, 0.0, 100.0, "m"},
+      at: [
+        {:list,
+         {:tuple, [{:integer, 0, 65_535}, {:tuple, place, "{x, y, degrees}"}],
+          "{id, {x, y, degrees}}"}},
+        required: true
+      ]
+    )
   end
 
   defp mission, do: Keyword.take(Landmark.Options.table(), Keyword.keys(@mission))
@@ -118,10 +135,15 @@ defmodule Lab.Trial.Options do
              "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
                Suggest.hint(inspect(who), robots)}
 
+    direct =
+      if options.marks != nil and options.blobs == :direct,
+        do: [{["marks"], "are seen in painted pictures only, blobs: :painted"}],
+        else: []
+
     cut? = Cuts.valid?(options.cuts, robots)
 
     if(cut?, do: [], else: [{["cuts"], cuts <> Wording.show(options.cuts)}]) ++
-      kills ++ Event.problems(options.script, robots)
+      direct ++ kills ++ Event.problems(options.script, robots)
   end
 
   @doc """

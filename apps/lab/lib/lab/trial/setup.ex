@@ -6,6 +6,7 @@ defmodule Lab.Trial.Setup do
   alias Hal.{Pose, Profile}
   alias Lab.Trial.Options
   alias Sim.World
+  alias Vision.Marks
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys ++ [plan: nil]
@@ -31,7 +32,8 @@ defmodule Lab.Trial.Setup do
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
-  `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
+  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}]]`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -68,6 +70,7 @@ defmodule Lab.Trial.Setup do
            at(["map"], Sim.Floorplan.open(options.map, length(options.robots), options.grey)),
          :ok <- at(["landmark"], check_landmarks(map, asked)),
          :ok <- at(["moves"], check_landmarks(map, moves)),
+         :ok <- at(["marks"], check_marks(options)),
          :ok <- check_script(map, options),
          {:ok, landmark, starts} <-
            at(["map"], Sim.Floorplan.places(map, bodies, options.seed, landmark)) do
@@ -105,6 +108,33 @@ defmodule Lab.Trial.Setup do
     end)
   end
 
+  @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
+  @spec looked_for(map()) :: keyword() | nil
+  def looked_for(%{marks: nil}), do: nil
+  def looked_for(%{marks: marks}), do: Keyword.take(marks, [:family, :size])
+
+  defp check_marks(%{marks: nil}), do: :ok
+
+  defp check_marks(%{marks: given} = options) do
+    with :ok <- Marks.available(), {:ok, %{family: family}} <- Marks.new(looked_for(options)) do
+      unknown = fn {id, _at} -> Marks.Native.picture(family, id) == nil end
+
+      case Enum.find(given[:at], unknown) do
+        nil -> :ok
+        {id, _at} -> {:error, "#{family} has no mark #{id}"}
+      end
+    end
+  end
+
+  defp hung(nil), do: []
+
+  defp hung(marks) do
+    for {id, {x, y, degrees}} <- marks[:at] do
+      pose = Pose.new(x, y, degrees * :math.pi() / 180)
+      [id: id, pose: pose] ++ Keyword.take(marks, [:family, :size, :height])
+    end
+  end
+
   # Places that a script names, which depend on the map.
   defp check_script(map, options) do
     options.script
@@ -140,6 +170,7 @@ defmodule Lab.Trial.Setup do
         seed: options.seed,
         noise: options.noise,
         landmark: landmark,
+        marks: hung(options.marks),
         robots:
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)

@@ -10,6 +10,7 @@ defmodule Record.Recording.Drawing do
   alias Mcap.Foxglove.Scene
   alias Robot.Percept
   alias Robot.Percept.Sighting
+  alias Vision.Mark
 
   @frame "map"
   @height 0.4
@@ -133,18 +134,25 @@ defmodule Record.Recording.Drawing do
 
   @doc "What was found in a picture, as boxes that viewers draw on it; `ns` is when it was taken."
   @spec boxes(non_neg_integer(), Vision.Detections.t()) :: iodata()
-  def boxes(ns, %{blobs: blobs}) do
+  def boxes(ns, %{blobs: blobs, marks: marks}) do
     boxes = for blob <- blobs, do: {{blob.left, blob.top, blob.right, blob.bottom}, blob.colour}
-    Foxglove.image_boxes(ns, boxes, @box)
+    marks = for mark <- marks || [], do: {Mark.box(mark), Mark.name(mark)}
+    Foxglove.image_boxes(ns, boxes ++ marks, @box)
   end
 
   @blob [:colour, :area, :x, :y, :left, :top, :right, :bottom]
+  @mark [:family, :id, :at_ms, :x, :y, :range, :bearing, :yaw, :range_sd, :bearing_sd, :yaw_sd]
 
   @doc "The same as plain JSON."
   @spec blobs(Vision.Detections.t()) :: binary()
-  def blobs(%{pan: pan, blobs: blobs}) do
-    blobs = for blob <- blobs, do: {:object, for(key <- @blob, do: {key, Map.fetch!(blob, key)})}
-    Json.encode!({:object, pan: pan, blobs: blobs})
+  def blobs(%{pan: pan, blobs: blobs, marks: marks}) do
+    objects = fn all, keys ->
+      for one <- all, do: {:object, for(key <- keys, do: {key, Map.fetch!(one, key)})}
+    end
+
+    # Of a robot that looks for none, nothing.
+    marks = if marks, do: [marks: objects.(marks, @mark)], else: []
+    Json.encode!({:object, [pan: pan, blobs: objects.(blobs, @blob)] ++ marks})
   end
 
   @doc "Sender, receiver and kind of a message, for `Hal.Json`."

@@ -102,7 +102,7 @@ defmodule Record.Recording.Tick do
   defp effects([], table), do: {[], table}
   defp effects(effects, table), do: Enum.map_reduce(effects, table, &effect/2)
 
-  defp input({:detections, %Detections{} = seen}, id, effects) do
+  defp input({:detections, %Detections{marks: nil} = seen}, id, effects) do
     {@detections, id, seen.at_ms, seen.pan, seen.tilt, seen.field_of_view, seen.pose,
      Enum.map(seen.blobs, &blob/1), effects}
   end

@@ -88,6 +88,7 @@ defmodule Robot.File.Summary do
         camera: robot.camera && device(robot.camera),
         lidar: robot.scan && device(robot.scan),
         "looks for": colours(robot.colours),
+        marks: marks(robot.marks),
         keeps: pictures(robot.save_pictures),
         records: recording(robot.record),
         keeps: incidents(robot.incidents),
@@ -255,6 +256,13 @@ defmodule Robot.File.Summary do
     Enum.map_join(classes, ", ", fn class ->
       if class.distance, do: "#{class.name} (with distance)", else: class.name
     end)
+  end
+
+  defp marks(nil), do: nil
+
+  defp marks(given) do
+    {:ok, marks} = Vision.Marks.new(given)
+    "#{marks.family}, #{metres(marks.size)} between their corners"
   end
 
   defp start(%Pose{x: x, y: y, heading: heading}),

@@ -40,6 +40,7 @@ defmodule Robot.File.Warnings do
     limits(robot) ++
       unseeing(robot) ++
       unscanned(robot) ++
+      markless(robot) ++
       narrow(robot) ++
       drive(robot) ++
       words(robot.drive) ++
@@ -72,6 +73,16 @@ defmodule Robot.File.Warnings do
     with line when line != nil <- blind(body),
          do: ["#{line}; a fence, and limits: [max_linear: 0.2] or less, are usual"],
          else: (nil -> [])
+  end
+
+  # The file may be checked on another machine than the robot's.
+  defp markless(%{marks: nil}), do: []
+
+  defp markless(_robot) do
+    case Vision.Marks.available() do
+      :ok -> []
+      {:error, line} -> ["marks: #{line}; without it this robot sees none"]
+    end
   end
 
   defp unscanned(%{scan: nil, profile: %{scan: scan, name: name}}) when scan != nil do

@@ -65,7 +65,8 @@ defmodule Sim.Compute.Columns do
     hits =
       for {range, pole} <- poles,
           column in range,
-          depth = meet(sight, pole, rx, ry),
+          {px, py, r, _height, _paint} = pole,
+          depth = meet({x, y}, {px, py, r}, rx, ry),
           do: {depth, pole}
 
     hits = Enum.sort_by(hits, &elem(&1, 0))
@@ -92,8 +93,9 @@ defmodule Sim.Compute.Columns do
     {top |> max(0) |> min(height), bottom |> max(-1) |> min(height - 1), luma}
   end
 
-  # The depth at which a ray meets a pole.
-  defp meet({sx, sy, _, _, _, _, _, _, _}, {x, y, r, _height, _paint}, rx, ry) do
+  @doc "The depth at which a ray from a place meets an upright cylinder; `nil` if it does not."
+  @spec meet({float(), float()}, {float(), float(), float()}, float(), float()) :: float() | nil
+  def meet({sx, sy}, {x, y, r}, rx, ry) do
     mx = x - sx
     my = y - sy
     a = rx * rx + ry * ry

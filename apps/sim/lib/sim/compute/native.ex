@@ -25,6 +25,6 @@ defmodule Sim.Compute.Native do
   @spec join(binary(), <<_::16>>) :: [Sim.Compute.Regions.t()]
   def join(_pieces, _least), do: :erlang.nif_error(:nif_not_loaded)
 
-  @spec paint(tuple(), tuple(), binary(), tuple() | nil, binary()) :: binary()
-  def paint(_map, _sight, _poles, _noise, _tables), do: :erlang.nif_error(:nif_not_loaded)
+  @spec paint(tuple(), tuple(), binary(), [tuple()], tuple() | nil, binary()) :: binary()
+  def paint(_map, _sight, _poles, _marks, _noise, _tables), do: :erlang.nif_error(:nif_not_loaded)
 end

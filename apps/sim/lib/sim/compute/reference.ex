@@ -2,7 +2,7 @@ defmodule Sim.Compute.Reference do
   @moduledoc false
   # Implements the kernels in plain Elixir, as their reference, with the arguments of `Sim.Compute.Native`. Every
   # operation and its order are the same in C. Pure.
-  alias Sim.Compute.{Columns, Rays}
+  alias Sim.Compute.{Columns, Marks, Rays}
   alias Sim.Noise
 
   @doc "See `Sim.Compute.field/3`. Two sweeps: from below and the left, from above and the right."
@@ -112,24 +112,26 @@ defmodule Sim.Compute.Reference do
   defdelegate join(pieces, least), to: Sim.Compute.Regions
 
   @doc "See `Sim.Compute.paint/4`."
-  @spec paint(tuple(), tuple(), binary(), Sim.Compute.noise(), binary()) :: binary()
-  def paint(map, {_, _, _, _, _, _, _, width, height} = sight, poles, noise, tables) do
+  @spec paint(tuple(), tuple(), binary(), [Marks.packed()], Sim.Compute.noise(), binary()) ::
+          binary()
+  def paint(map, {_, _, _, _, _, _, _, width, height} = sight, poles, marks, noise, tables) do
     poles = Columns.poles(sight, poles)
+    marks = for mark <- marks, do: Marks.cover(map, sight, poles, mark)
     columns = for u <- 0..(width - 1), do: Columns.column(map, sight, poles, u, :walls)
     half = Enum.take_every(columns, 2)
     size = div(byte_size(tables), 2)
     {luma, chroma} = :erlang.split_binary(tables, size)
 
     [
-      for(v <- 0..(height - 1), do: row(columns, v, height, noise, 0x40000 + v, luma))
+      for(v <- 0..(height - 1), do: row(columns, v, height, marks, noise, 0x40000 + v, luma))
       |> salt(width * height, noise),
-      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 1, noise, 0x50000 + v, chroma)),
-      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 2, noise, 0x60000 + v, chroma))
+      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 1, marks, noise, 0x50000 + v, chroma)),
+      for(v <- 0..(div(height, 2) - 1), do: tint(half, v, 2, marks, noise, 0x60000 + v, chroma))
     ]
     |> IO.iodata_to_binary()
   end
 
-  defp row(columns, v, height, noise, use, table) do
+  defp row(columns, v, height, marks, noise, use, table) do
     ceiling = 145 - div(20 * v, height)
     ground = 75 + div(45 * v, height)
     draws = draws(noise, use, table)
@@ -143,7 +145,7 @@ defmodule Sim.Compute.Reference do
           nil -> ground
         end
 
-      <<base + draws.(u)>>
+      <<Marks.over(marks, {u, v}, base) + draws.(u)>>
     end
   end
 
@@ -161,13 +163,13 @@ defmodule Sim.Compute.Reference do
   end
 
   # The darker, the greyer.
-  defp tint(columns, v, channel, noise, use, table) do
+  defp tint(columns, v, channel, marks, noise, use, table) do
     draws = draws(noise, use, table)
 
     for {{_room, pieces}, u} <- Enum.with_index(columns), into: <<>> do
       base =
-        case piece(pieces, 2 * v) do
-          nil ->
+        case not Marks.covered?(marks, {2 * u, 2 * v}) && piece(pieces, 2 * v) do
+          none when none in [nil, false] ->
             128
 
           {_top, _bottom, {_kind, paint, _, _} = kind, luma} ->

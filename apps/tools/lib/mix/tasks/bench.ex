@@ -22,6 +22,9 @@ defmodule Mix.Tasks.Bench do
   `mix bench vision` measures how long a frame takes in the native backend, with and without the
   call from Elixir, beside a copy of the frame and the other backends.
 
+  `mix bench marks` measures in how many pictures marks are found, in how many one is seen that is not there, and how wrong
+  their places are.
+
   `mix bench scale` measures what a robot costs in fleets of different sizes, as a table and as bars.
 
   `mix bench page` measures what the page costs a fleet, with browsers that read and with some that do not.
@@ -40,6 +43,7 @@ defmodule Mix.Tasks.Bench do
     "stop" => Bench.Stop.Main,
     "bases" => Bench.Bases.Main,
     "vision" => Bench.Vision.Main,
+    "marks" => Bench.Marks.Main,
     "scale" => Bench.Scale.Main,
     "page" => Bench.Page.Main,
     "recording" => Bench.Recording.Main
@@ -70,7 +74,7 @@ defmodule Mix.Tasks.Bench do
     do:
       refuse([
         "mix bench needs a command: mix bench demo [options], mix bench goto [options], mix bench explore [options], " <>
-          "mix bench swarm [options], mix bench stop [options], mix bench bases [options], mix bench vision [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
+          "mix bench swarm [options], mix bench stop [options], mix bench bases [options], mix bench vision [options], mix bench marks [options], mix bench scale [options], mix bench page [options], mix bench recording [options]"
       ])
 
   defp of_mission(%{"mission" => mission} = given) do

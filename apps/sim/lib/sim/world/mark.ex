@@ -1,0 +1,63 @@
+defmodule Sim.World.Mark do
+  @moduledoc """
+  Describes a printed mark with an id that hangs in a world: flat and upright, one side printed. Pure.
+
+  It needs libapriltag, which knows the pictures of the ids (`Vision.Marks.available/0`). It is no obstacle. Hang it a little
+  before its wall: what is in the wall is hidden.
+  """
+  alias Hal.{Options, Pose}
+  alias Vision.Marks
+
+  @table [
+    family: [{:one_of, Marks.families()}, default: :tag36h11],
+    id: [{:integer, 0, 65_535}, required: true],
+    size: [{:number, 0.01, 10.0, "m"}, default: 0.16],
+    pose: [{:struct, Pose}, required: true],
+    height: [{:number, 0.0, 100.0, "m"}, default: 0.3]
+  ]
+
+  @enforce_keys Keyword.keys(@table) ++ [:packed]
+  defstruct @enforce_keys
+
+  @typedoc "`pose` is the place of its middle, and where it faces; `height` that of its middle; `size` the side of its border, in metres."
+  @type t :: %__MODULE__{
+          family: Vision.Mark.family(),
+          id: non_neg_integer(),
+          size: float(),
+          pose: Pose.t(),
+          height: float(),
+          packed: Sim.Compute.Marks.packed()
+        }
+
+  @doc "A mark, of keys and values. Wrong ones, and a missing library, raise `ArgumentError`."
+  @spec new!(keyword()) :: t()
+  def new!(options) do
+    options = Options.check!(options, @table, "mark")
+    with {:error, line} <- Marks.available(), do: raise(ArgumentError, line)
+
+    case Marks.Native.picture(options[:family], options[:id]) do
+      nil ->
+        raise ArgumentError, "mark option id: #{options[:family]} has no mark #{options[:id]}"
+
+      picture ->
+        painted!(options, picture)
+    end
+  end
+
+  @doc "The same with another picture (`Vision.Marks.Native.picture/2`) than that of its id."
+  @spec painted!(keyword(), {pos_integer(), pos_integer(), binary()}) :: t()
+  def painted!(options, picture) do
+    mark = options |> Options.check!(@table, "mark") |> Map.new()
+    struct!(__MODULE__, Map.put(mark, :packed, packed(mark, picture)))
+  end
+
+  # With the white cells round it that it is printed with.
+  defp packed(%{pose: pose} = mark, {cells, border, picture}) do
+    {cosine, sine} = Sim.Trig.cos_sin(pose.heading)
+    edge = :binary.copy(<<1>>, cells + 2)
+    rows = for <<row::binary-size(cells) <- picture>>, into: <<>>, do: <<1, row::binary, 1>>
+
+    {pose.x, pose.y, cosine, sine, mark.height * 1.0, mark.size / border, cells + 2,
+     edge <> rows <> edge}
+  end
+end

@@ -1,0 +1,129 @@
+defmodule Vision.Marks do
+  @moduledoc """
+  Finds printed square marks with an id in frames: AprilTags of the families `tag36h11` (587 ids) and `tagStandard41h12` (2115
+  ids). All marks that a robot looks for are of one family, and of one size.
+
+  It needs Debian's `libapriltag-dev` when the project is built, and `libapriltag3` when it runs: `available/0`. `mix mark`
+  prints marks.
+  """
+  alias Hal.Frame
+  alias Vision.Mark
+  alias Vision.Marks.{Native, Pose, Schedule}
+
+  @families [:tag36h11, :tagStandard41h12]
+  # Marks with less contrast between their cells, in grey levels of 255, are left out.
+  @least_margin 5.0
+  # A corner that was nearer to the edge of the frame made a range 4 % too long.
+  @edge_px 3.0
+
+  @enforce_keys [:family, :size]
+  defstruct @enforce_keys
+
+  @typedoc "What is looked for: the family, and the side of the square between the corners in metres."
+  @type t :: %__MODULE__{family: Mark.family(), size: float()}
+
+  @doc "The options of `new/1`, as a table of `Hal.Options`."
+  @spec table() :: Hal.Options.table()
+  def table do
+    [
+      family: [{:one_of, @families}, default: :tag36h11],
+      size: [{:number, 0.01, 10.0, "m"}, required: true]
+    ]
+  end
+
+  @doc """
+  What is to be looked for; the error is one line.
+
+      iex> Vision.Marks.new(size: 0.16)
+      {:ok, %Vision.Marks{family: :tag36h11, size: 0.16}}
+      iex> {:error, line} = Vision.Marks.new(family: :tag16h5, size: 0.16)
+      iex> line =~ "tag36h11 or :tagStandard41h12"
+      true
+  """
+  @spec new(keyword()) :: {:ok, t()} | {:error, line :: String.t()}
+  def new(options) do
+    with {:ok, options} <- Hal.Options.check(options, table(), "marks"),
+         do: {:ok, struct!(__MODULE__, options)}
+  end
+
+  @doc "All families."
+  @spec families() :: [Mark.family(), ...]
+  def families, do: @families
+
+  @doc "Whether marks can be found and drawn here, or in one line why not."
+  @spec available() :: :ok | {:error, line :: String.t()}
+  def available do
+    if Native.loaded?(),
+      do: :ok,
+      else:
+        {:error,
+         "there is no libapriltag: install libapriltag-dev, and compile again (mix compile)"}
+  end
+
+  @doc "What the process that calls this needs for `look/4`, once; the error is that of `available/0`."
+  @spec detector(t()) :: {:ok, Native.detector()} | {:error, line :: String.t()}
+  def detector(%__MODULE__{family: family}) do
+    with :ok <- available(), do: {:ok, Native.detector(family)}
+  end
+
+  @doc """
+  The marks that hold in a frame, by id and then from the left, and the schedule for the next frame. Marks at the edge of the
+  frame are left out. Where the schedule has
+  nothing searched in this frame, they are those of the last search, with its `at_ms`.
+  """
+  @spec look(t(), Native.detector(), Schedule.t(), Frame.t()) ::
+          {:ok, [Mark.t()], Schedule.t()} | {:error, term()}
+  def look(%__MODULE__{} = marks, detector, %Schedule{} = schedule, %Frame{} = frame) do
+    with {part, boxes} <- Schedule.plan(schedule, frame.at_ms, {frame.width, frame.height}),
+         {:ok, found} <- search(boxes, detector, frame, []) do
+      seen = for one <- Enum.sort(found), clear?(one, frame), do: mark(one, marks, frame)
+      {:ok, seen, Schedule.note(schedule, part, frame.at_ms, seen)}
+    else
+      :rest -> {:ok, schedule.marks, schedule}
+      error -> error
+    end
+  end
+
+  @doc "All marks of a frame, whatever was seen before."
+  @spec find(t(), Native.detector(), Frame.t()) :: {:ok, [Mark.t()]} | {:error, term()}
+  def find(%__MODULE__{} = marks, detector, %Frame{} = frame) do
+    with {:ok, seen, _schedule} <- look(marks, detector, %Schedule{}, frame), do: {:ok, seen}
+  end
+
+  defp search([], _detector, _frame, found), do: {:ok, found}
+
+  defp search([box | boxes], detector, frame, found) do
+    with {:ok, more} <- Native.search(detector, frame, box),
+         do: search(boxes, detector, frame, more ++ found)
+  end
+
+  defp clear?({_id, _wrong_bits, margin, _centre, corners}, %Frame{width: width, height: height}) do
+    margin >= @least_margin and
+      Enum.all?(corners, fn {x, y} ->
+        x >= @edge_px and y >= @edge_px and x <= width - 1 - @edge_px and
+          y <= height - 1 - @edge_px
+      end)
+  end
+
+  defp mark({id, _wrong_bits, _margin, {x, y}, corners}, marks, frame) do
+    mark = %Mark{
+      family: marks.family,
+      id: id,
+      at_ms: frame.at_ms,
+      x: x,
+      y: y,
+      corners: corners,
+      width: frame.width,
+      height: frame.height
+    }
+
+    struct!(mark, reading(corners, frame, marks.size))
+  end
+
+  defp reading(_corners, %Frame{field_of_view: nil}, _size), do: %{}
+
+  defp reading(corners, frame, size) do
+    camera = %{frame | pan: frame.pan || 0.0, tilt: frame.tilt || 0.0}
+    Pose.reading(corners, camera, size) || %{}
+  end
+end
