@@ -5,7 +5,13 @@ defmodule Tools.MixProject do
 
   def project do
     Convoy.Support.project(:tools,
-      native: [nifs: [kernel: ["../../vision/c_src/blobs.c", "kernel_nif.c"]]],
+      native: [
+        nifs: [
+          kernel:
+            for(name <- ~w(blobs runs masks), do: "../../vision/c_src/#{name}.c") ++
+              ["kernel_nif.c"]
+        ]
+      ],
       deps: [
         {:agents, in_umbrella: true},
         {:bridge, in_umbrella: true},

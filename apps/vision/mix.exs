@@ -6,9 +6,11 @@ defmodule Vision.MixProject do
   def project do
     Convoy.Support.project(:vision,
       native: [
-        nifs: [blobs: ["blobs.c", "blobs_nif.c"]],
+        nifs: [blobs: ["blobs.c", "runs.c", "masks.c", "blobs_nif.c"]],
         optional: [
-          marks: {"apriltag", "apriltag/apriltag.h", ["marks.c", "blobs.c", "marks_nif.c"]}
+          marks:
+            {"apriltag", "apriltag/apriltag.h",
+             ["marks.c", "blobs.c", "runs.c", "masks.c", "marks_nif.c"]}
         ]
       ],
       packages: [nx: "~> 0.6", evision: "~> 0.2.10"],

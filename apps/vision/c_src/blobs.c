@@ -4,17 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define NONE UINT32_MAX
+#include "runs.h"
+
 #define LARGEST 32768u          /* pixels per side, so that areas and labels fit into 32 bits */
 #define FEWEST 256u             /* regions for which there is room at least */
-
-/* Inlined into one loop over the rows they are slower by a quarter: there are not enough registers. */
-#define NOINLINE __attribute__((noinline))
-
-struct blobs_run {
-    uint32_t start, end, mask;  /* end is exclusive */
-    uint32_t label;
-};
 
 int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes, size_t size,
               struct blobs_picture *picture)
@@ -47,73 +40,6 @@ int blobs_lay(int format, uint32_t width, uint32_t height, const uint8_t *bytes,
     picture->chroma_row = planar ? w / 2 : w;
     picture->chroma_rows = 2;
     return 0;
-}
-
-/* Finds the classes that the chroma of each pair of pixels allows; returns those of the row. */
-static NOINLINE uint32_t allow_chroma(const struct blobs_picture *picture, uint32_t row,
-                             const uint32_t *tables, uint32_t *restrict pairs)
-{
-    size_t step = picture->chroma_step, at = row / picture->chroma_rows * picture->chroma_row;
-    const uint8_t *u = picture->u + at, *v = picture->v + at;
-    const uint32_t *u_table = tables + 256, *v_table = tables + 512;
-    uint32_t any = 0, count = picture->width / 2;
-
-    for (uint32_t k = 0; k < count; k++, u += step, v += step)
-        any |= pairs[k] = u_table[*u] & v_table[*v];
-    return any;
-}
-
-/* Finds the runs of one row, from its pairs and its luma. There are at most `width` of them. */
-static inline __attribute__((always_inline)) size_t find_runs_by(size_t step, const uint8_t *luma,
-                                                                  uint32_t width,
-                                                                  const uint32_t *y_table,
-                                                                  const uint32_t *pairs,
-                                                                  struct blobs_run *runs)
-{
-    size_t count = 0;
-    uint32_t open = 0;
-
-    for (uint32_t x = 0; x < width; x += 2) {
-        const uint32_t *pair = pairs + x / 2;
-
-        if (open == 0) {
-            /* Most of a picture is background: skips 8 pixels at a time. */
-            while (width - x >= 8 && (pair[0] | pair[1] | pair[2] | pair[3]) == 0) {
-                x += 8;
-                pair += 4;
-            }
-            if (x == width)
-                break;
-        }
-        uint32_t left = *pair & y_table[luma[x * step]], right = *pair & y_table[luma[(x + 1) * step]];
-
-        if (left != open) {
-            if (open)
-                runs[count - 1].end = x;
-            if (left)
-                runs[count++] = (struct blobs_run){ .start = x, .mask = left, .label = NONE };
-        }
-        if (right != left) {
-            if (left)
-                runs[count - 1].end = x + 1;
-            if (right)
-                runs[count++] = (struct blobs_run){ .start = x + 1, .mask = right, .label = NONE };
-        }
-        open = right;
-    }
-    if (open)
-        runs[count - 1].end = width;
-    return count;
-}
-
-static NOINLINE size_t find_runs(const struct blobs_picture *picture, uint32_t row, const uint32_t *y_table,
-                        const uint32_t *pairs, struct blobs_run *runs)
-{
-    const uint8_t *luma = picture->y + row * picture->y_row;
-
-    /* Two copies with a constant step are faster than one. */
-    return picture->y_step == 1 ? find_runs_by(1, luma, picture->width, y_table, pairs, runs)
-                                : find_runs_by(2, luma, picture->width, y_table, pairs, runs);
 }
 
 /* The root of a label; halves the path for the next time. */
@@ -196,7 +122,7 @@ static int new_region(struct blobs_scratch *scratch, struct blobs_run *run, uint
 /* A run that has touched nothing is a region if it is large enough. In noise few are. */
 static int end_run(struct blobs_scratch *scratch, struct blobs_run *run, uint32_t row, uint32_t min_area)
 {
-    if (run->label != NONE || run->end - run->start < min_area)
+    if (run->label != RUNS_NONE || run->end - run->start < min_area)
         return 0;
     return new_region(scratch, run, row);
 }
@@ -204,8 +130,8 @@ static int end_run(struct blobs_scratch *scratch, struct blobs_run *run, uint32_
 /* Joins a run to one that it touches in the row above. */
 static int join(struct blobs_scratch *scratch, struct blobs_run *above, struct blobs_run *run, uint32_t row)
 {
-    if (above->label == NONE) {
-        if (run->label != NONE) {
+    if (above->label == RUNS_NONE) {
+        if (run->label != RUNS_NONE) {
             add_run(scratch->regions + run->label, above, row - 1);
             above->label = run->label;
             return 0;
@@ -213,7 +139,7 @@ static int join(struct blobs_scratch *scratch, struct blobs_run *above, struct b
         if (new_region(scratch, above, row - 1) != 0)
             return -1;
     }
-    if (run->label != NONE) {
+    if (run->label != RUNS_NONE) {
         run->label = unite(scratch->regions, run->label, above->label);
     } else {
         run->label = root(scratch->regions, above->label);
@@ -273,18 +199,18 @@ static void keep(struct blobs_scratch *scratch, uint32_t min_area, uint32_t max_
 
 static int make_rows(struct blobs_scratch *scratch, size_t width)
 {
-    if (width <= scratch->width)
+    if (scratch->rows && width <= scratch->width)
         return 0;
     struct blobs_run *runs = realloc(scratch->runs, 2 * width * sizeof *runs);
 
     if (runs == NULL)
         return -1;
     scratch->runs = runs;
-    uint32_t *pairs = realloc(scratch->pairs, width / 2 * sizeof *pairs);
+    struct runs_rows *rows = runs_room(scratch->rows, width);
 
-    if (pairs == NULL)
+    if (rows == NULL)
         return -1;
-    scratch->pairs = pairs;
+    scratch->rows = rows;
     scratch->width = width;
     return 0;
 }
@@ -305,12 +231,11 @@ static void give_back(struct blobs_scratch *scratch)
 }
 
 /* Searches the rows that are left. */
-static enum blobs_result find_rows(const struct blobs_picture *picture, const uint32_t tables[768],
-                                   uint32_t min_area, struct blobs_scratch *scratch,
+static enum blobs_result find_rows(const struct blobs_picture *picture, uint32_t min_area, struct blobs_scratch *scratch,
                                    blobs_pause *pause, void *context)
 {
     size_t width = picture->width, searched = 0, above_count = scratch->above_count;
-    uint32_t row = scratch->row, any = scratch->any;
+    uint32_t row = scratch->row;
     enum blobs_result result = BLOBS_DONE;
 
     for (; result == BLOBS_DONE && row < picture->height; row++, searched += width) {
@@ -323,10 +248,7 @@ static enum blobs_result find_rows(const struct blobs_picture *picture, const ui
         }
         struct blobs_run *here = scratch->runs + row % 2 * width;
         struct blobs_run *above = scratch->runs + (row + 1) % 2 * width;
-
-        if (row % picture->chroma_rows == 0)
-            any = allow_chroma(picture, row, tables, scratch->pairs);
-        size_t here_count = any ? find_runs(picture, row, tables, scratch->pairs, here) : 0;
+        size_t here_count = runs_find(scratch->rows, picture, row, min_area, here);
 
         if (join_rows(above, above_count, here, here_count, row, min_area, scratch) != 0)
             result = BLOBS_MEMORY;
@@ -337,7 +259,6 @@ static enum blobs_result find_rows(const struct blobs_picture *picture, const ui
         join_rows(scratch->runs + (row + 1) % 2 * width, above_count, NULL, 0, row, min_area, scratch) != 0)
         result = BLOBS_MEMORY;
     scratch->row = row;
-    scratch->any = any;
     scratch->above_count = above_count;
     return result;
 }
@@ -350,13 +271,14 @@ enum blobs_result blobs_find(const struct blobs_picture *picture, const uint32_t
 
     if (scratch->stage == BLOBS_IDLE) {
         scratch->count = scratch->above_count = 0;
-        scratch->row = scratch->any = 0;
+        scratch->row = 0;
         if (make_rows(scratch, picture->width) != 0)
             return BLOBS_MEMORY;
+        runs_begin(scratch->rows, tables);
         scratch->stage = BLOBS_ROWS;
     }
     if (scratch->stage == BLOBS_ROWS) {
-        result = find_rows(picture, tables, min_area, scratch, pause, context);
+        result = find_rows(picture, min_area, scratch, pause, context);
         if (result == BLOBS_PAUSED)
             return result;
         give_back(scratch);
@@ -378,12 +300,12 @@ void blobs_release(struct blobs_scratch *scratch)
 {
     free(scratch->regions);
     free(scratch->runs);
-    free(scratch->pairs);
+    free(scratch->rows);
     *scratch = (struct blobs_scratch){ 0 };
 }
 
 size_t blobs_held(const struct blobs_scratch *scratch)
 {
-    return scratch->room * sizeof *scratch->regions + scratch->width * (2 * sizeof *scratch->runs) +
-           scratch->width / 2 * sizeof *scratch->pairs;
+    return scratch->room * sizeof *scratch->regions + scratch->width * 2 * sizeof *scratch->runs +
+           (scratch->rows ? runs_bytes(scratch->width) : 0);
 }

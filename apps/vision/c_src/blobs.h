@@ -31,11 +31,11 @@ struct blobs_scratch {
     size_t most;                /* the most since the room was last looked at */
     uint32_t pictures;          /* how many pictures that was */
     struct blobs_run *runs;     /* of two rows: the one above, and the one that is searched */
-    uint32_t *pairs;
-    size_t width;               /* the widest row that fits into runs and pairs */
+    struct runs_rows *rows;     /* what finds them */
+    size_t width;               /* the widest row that fits into runs and rows */
     /* How far the search is, if it was paused. */
     enum { BLOBS_IDLE, BLOBS_ROWS, BLOBS_KEPT } stage;
-    uint32_t row, any;
+    uint32_t row;
     size_t above_count;
 };
 

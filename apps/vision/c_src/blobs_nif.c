@@ -16,7 +16,7 @@ struct kept {
 };
 
 /* The layout of `struct kept`: resources of another layout are then of another type. */
-#define KEPT_TYPE "scratch 1"
+#define KEPT_TYPE "scratch 2"
 
 static ErlNifResourceType *kept_type;
 

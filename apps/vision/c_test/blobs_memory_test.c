@@ -1,4 +1,4 @@
-// sources: ../c_src/blobs.c
+// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/runs.c
 // flags: -Drealloc=scarce_realloc
 /* The blob finder where memory runs out: at each allocation in turn, and then the same scratch again. */
 #undef realloc
@@ -43,7 +43,7 @@ int main(void)
     tables[1] = 0;
     blobs_lay(BLOBS_YUYV, width, height, bytes, size, &picture);
 
-    /* A chessboard of 2,048 regions: rows, then room for 256, 512, 1,024 and 2,048. */
+    /* A chessboard of 2,048 regions: runs and rows, then room for 256, 512, 1,024 and 2,048. */
     for (;; needed++) {
         left = needed;
         if (blobs_find(&picture, tables, 1, 0, &scratch, NULL, NULL) == 0)

@@ -1,4 +1,4 @@
-// sources: ../c_src/blobs.c
+// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/runs.c
 /* Random pictures of all sizes through the blob finder, one after the other in the same scratch, each
    compared with a flood fill, under sanitizers. The bytes are in blocks of exactly their size, so that
    a read beyond them is seen. */
@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "blobs.h"
+#include "masks.h"
 
 static uint32_t seed = 1;
 
@@ -69,6 +70,21 @@ static void flood(const struct blobs_picture *p, const uint32_t *tables, uint32_
     free(open);
 }
 
+/* Up to 32 classes that are ranges, as those of people are. */
+static void make_ranges(uint32_t tables[768])
+{
+    uint32_t classes = random_below(2) ? 1 + random_below(8) : 1 + random_below(32);
+
+    memset(tables, 0, 768 * sizeof *tables);
+    for (uint32_t bit = 0; bit < classes; bit++)
+        for (uint32_t channel = 0; channel < 3; channel++) {
+            uint32_t first = random_below(256), last = first + random_below(256 - first);
+
+            for (uint32_t k = first; k <= last; k++)
+                tables[256 * channel + k] |= 1u << bit;
+        }
+}
+
 static struct blobs_scratch scratch;
 
 static int sometimes(void *context)
@@ -89,6 +105,8 @@ static void one_picture(int format, uint32_t width, uint32_t height, uint32_t le
         bytes[k] = (uint8_t)random_below(levels);
     for (int k = 0; k < 768; k++)
         tables[k] = random_below(4) ? 1u << random_below(32) | random_below(8) : 0xFFFFFFFF;
+    if (random_below(2))
+        make_ranges(tables);
     if (blobs_lay(format, width, height, bytes, size, &picture) != 0)
         fail("a right size was refused");
     if (blobs_lay(format, width, height, bytes, size - 1, &picture) == 0 ||
@@ -170,18 +188,22 @@ static void memory_over_time(void)
 
 int main(void)
 {
-    for (int k = 0; k < 3000; k++) {
-        int format = k % 3;
-        uint32_t width = 2 * (1 + random_below(40)), height = 1 + random_below(30);
+    for (int way = MASKS_PORTABLE; way < MASKS_WAYS; way++) {
+        if (masks_limit((enum masks_way)way) != (enum masks_way)way)
+            continue;
+        for (int k = 0; k < 3000; k++) {
+            int format = k % 3;
+            uint32_t width = 2 * (1 + random_below(k % 5 ? 40 : 160)), height = 1 + random_below(30);
 
-        one_picture(format, width, format == BLOBS_YUYV ? height : 2 * height,
-                    k % 2 ? 256 : 1 + random_below(3));
+            one_picture(format, width, format == BLOBS_YUYV ? height : 2 * height,
+                        k % 2 ? 256 : 1 + random_below(3));
+        }
+        one_picture(BLOBS_YUYV, 640, 480, 2);
+        one_picture(BLOBS_I420, 640, 480, 256);
+        one_picture(BLOBS_NV12, 2, 2, 256);
+        one_picture(BLOBS_YUYV, 32768, 4, 256);
+        memory_over_time();
     }
-    one_picture(BLOBS_YUYV, 640, 480, 2);
-    one_picture(BLOBS_I420, 640, 480, 256);
-    one_picture(BLOBS_NV12, 2, 2, 256);
-    one_picture(BLOBS_YUYV, 32768, 4, 256);
-    memory_over_time();
     blobs_release(&scratch);
     return 0;
 }

@@ -1,7 +1,9 @@
 defmodule Vision.Backend.Native do
   @moduledoc """
   Finds blobs in C, for yuyv, i420 and nv12. It makes no label image: it joins runs of equal masks to those of the row
-  above, so that only runs and regions take memory.
+  above, so that only runs and regions take memory. Where the processor has AVX-512 (with VBMI) or AVX2, it looks up the classes
+  of 64 or 32 pixels at once; AVX2 needs classes that are ranges, as those of `Vision.Colours` are. The regions are the same
+  everywhere.
 
   With a scratch it searches for up to a millisecond on the scheduler of its caller; a large or
   noisy frame is finished on a dirty scheduler. Without one it is a dirty scheduler's from the
@@ -13,8 +15,8 @@ defmodule Vision.Backend.Native do
   are too small to be kept. To take that memory for each frame may cost half of the search, because the
   system clears each page again. So a process keeps a `scratch/0`, whose memory stays:
 
-    * it grows with the frames, to 96 bytes for each pixel at the very most, plus 34 bytes for
-      each column of the widest one; most frames need less than 100 kB;
+    * it grows with the frames, to 96 bytes for each pixel at the very most, plus 46 bytes for
+      each column of the widest one and 9 kB; most frames need less than 100 kB;
     * after 64 frames in a row that needed less than a quarter of its room for regions, it keeps
       twice what they needed;
     * garbage collection frees it when nothing refers to it any more;
