@@ -146,11 +146,11 @@ defmodule Lab.Trial.Setup do
   defp objects(options) do
     balls =
       for {{x, y}, n} <- Enum.with_index(options.balls, 1),
-          do: [id: :"ball#{n}", kind: :ball, pose: Pose.new(x, y)]
+          do: [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)]
 
     boxes =
       for {{x, y, degrees}, n} <- Enum.with_index(options.boxes, 1),
-          do: [id: :"box#{n}", kind: :box, pose: Pose.new(x, y, degrees * :math.pi() / 180)]
+          do: [id: "box#{n}", kind: :box, pose: Pose.new(x, y, degrees * :math.pi() / 180)]
 
     Enum.map(balls ++ boxes, &Object.new!/1)
   end
@@ -158,7 +158,7 @@ defmodule Lab.Trial.Setup do
   defp check_objects(map, objects) do
     Enum.find_value(objects, :ok, fn %{id: id, kind: kind, pose: pose} = object ->
       unless Object.free?(object, map) do
-        n = id |> Atom.to_string() |> String.replace_prefix("#{kind}", "")
+        n = String.replace_prefix(id, "#{kind}", "")
         line = "#{id} cannot be at #{pose.x},#{pose.y} of map #{map.name}: there is a wall"
         at([if(kind == :ball, do: "balls", else: "boxes"), n], {:error, line})
       end

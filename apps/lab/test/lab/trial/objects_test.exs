@@ -46,4 +46,19 @@ defmodule Lab.Trial.ObjectsTest do
           do: assert(elem(Object.gap(ball, {start.x, start.y, profile.radius}), 0) > 0.05)
     end
   end
+
+  test "the lowest row of a ball's blob tells how far it is" do
+    options = Map.put(@options, :seed, 2)
+    {:ok, still} = Trial.setup(options)
+    %{start: %{x: x, y: y, heading: heading}, profile: profile} = hd(still.robots)
+
+    for metres <- [1.7, 2.5, 4.0], blobs <- [:direct, :painted] do
+      place = {x + metres * :math.cos(heading), y + metres * :math.sin(heading)}
+      {:ok, trial} = options |> Map.merge(%{blobs: blobs, balls: [place]}) |> Trial.new()
+      {%{blobs: seen}, _trial} = Trial.Mechanics.look(trial, :mag1)
+      blob = Enum.find(seen, &(&1.colour == "OrangeBall"))
+      {range, sd} = Robot.Percept.Ground.range(blob, profile.camera, profile.camera.field_of_view)
+      assert_in_delta range + 0.11, metres, 2.5 * sd
+    end
+  end
 end

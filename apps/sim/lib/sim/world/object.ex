@@ -13,7 +13,7 @@ defmodule Sim.World.Object do
   alias Sim.World.Contact
 
   @table [
-    id: [{:check, &is_atom/1, "a name"}, required: true],
+    id: [{:text, "a name"}, required: true],
     kind: [{:one_of, [:ball, :box]}, required: true],
     pose: [{:struct, Pose}, required: true],
     radius: [{:number, 0.03, 1.0, "m"}, default: 0.11],
@@ -27,7 +27,7 @@ defmodule Sim.World.Object do
 
   @typedoc "Sizes in metres; the length of a box is along its heading. `velocity` is that of a ball that rolls, in m/s."
   @type t :: %__MODULE__{
-          id: atom(),
+          id: String.t(),
           kind: :ball | :box,
           pose: Pose.t(),
           size: radius :: float() | {length :: float(), width :: float()},
@@ -39,7 +39,7 @@ defmodule Sim.World.Object do
   An object at rest, of keys and values: `id`, `kind`, `pose`, and `radius` of a ball, `length`, `width` and `height` of a box. Wrong
   ones raise `ArgumentError`.
 
-      iex> ball = Sim.World.Object.new!(id: :ball1, kind: :ball, pose: Hal.Pose.new(1, 0))
+      iex> ball = Sim.World.Object.new!(id: "ball1", kind: :ball, pose: Hal.Pose.new(1, 0))
       iex> {Sim.World.Object.colour(ball), ball.size, ball.height}
       {"OrangeBall", 0.11, 0.22}
   """
@@ -66,6 +66,22 @@ defmodule Sim.World.Object do
   def corners(%__MODULE__{pose: pose, size: {length, width}}) do
     for {along, across} <- [{1, 1}, {-1, 1}, {-1, -1}, {1, -1}],
         do: Pose.place(pose, {along * length / 2, across * width / 2})
+  end
+
+  @doc "It as viewers are shown it (`t:Sim.Scene.thing/0`)."
+  @spec thing(t()) :: Sim.Scene.thing()
+  def thing(%__MODULE__{id: id, kind: kind, pose: pose, size: size, height: height} = object) do
+    radius = if kind == :ball, do: size
+
+    %{
+      id: id,
+      kind: kind,
+      pose: pose,
+      radius: radius,
+      corners: corners(object),
+      size: size,
+      height: height
+    }
   end
 
   @doc "It as cameras see it (`Sim.Compute.CameraFrustum`)."
@@ -95,7 +111,7 @@ defmodule Sim.World.Object do
   How far a disc is from it, edge to edge, negative where they overlap; the direction from the disc to it, of length 1; and where
   they touch, or would.
 
-      iex> box = Sim.World.Object.new!(id: :box1, kind: :box, pose: Hal.Pose.new(1, 0))
+      iex> box = Sim.World.Object.new!(id: "box1", kind: :box, pose: Hal.Pose.new(1, 0))
       iex> {gap, {x, y}, {_px, _py}} = Sim.World.Object.gap(box, {0.0, 0.0, 0.3})
       iex> {Float.round(gap, 6), x, y}
       {0.1, 1.0, 0.0}

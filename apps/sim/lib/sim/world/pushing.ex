@@ -172,7 +172,7 @@ defmodule Sim.World.Pushing do
   end
 
   @doc "The world where an object was put, by a person, at rest; the error is one line."
-  @spec place(World.t(), atom(), Pose.t()) :: {:ok, World.t()} | {:error, String.t()}
+  @spec place(World.t(), String.t(), Pose.t()) :: {:ok, World.t()} | {:error, String.t()}
   def place(%{objects: objects} = world, id, %Pose{} = pose) do
     case Enum.split_with(objects, &(&1.id == id)) do
       {[object], others} ->

@@ -16,10 +16,10 @@ defmodule Sim.World.ObjectTest do
     World.new!([map: map, robots: robots, objects: objects, seed: 3] ++ options)
   end
 
-  defp ball(x, y), do: Object.new!(id: :ball1, kind: :ball, pose: Pose.new(x, y))
+  defp ball(x, y), do: Object.new!(id: "ball1", kind: :ball, pose: Pose.new(x, y))
 
   defp box(x, y, heading),
-    do: Object.new!(id: :box1, kind: :box, pose: Pose.new(x, y, heading))
+    do: Object.new!(id: "box1", kind: :box, pose: Pose.new(x, y, heading))
 
   defp steps(world, count), do: Enum.reduce(1..count, world, fn _, world -> World.step(world) end)
 
@@ -162,12 +162,15 @@ defmodule Sim.World.ObjectTest do
 
   test "objects are put where there is room, and nowhere else" do
     world = world([Pose.new(-1, 0)], [ball(0, 0), box(2, 2, 0)])
-    assert {:ok, %{objects: [%{pose: pose}, _box]}} = Pushing.place(world, :ball1, Pose.new(1, 1))
+
+    assert {:ok, %{objects: [%{pose: pose}, _box]}} =
+             Pushing.place(world, "ball1", Pose.new(1, 1))
+
     assert pose == Pose.new(1, 1)
 
     for place <- [Pose.new(-1, 0.2), Pose.new(2.3, 2), Pose.new(8.95, 0)],
-        do: assert({:error, "ball1 cannot" <> _} = Pushing.place(world, :ball1, place))
+        do: assert({:error, "ball1 cannot" <> _} = Pushing.place(world, "ball1", place))
 
-    assert Pushing.place(world, :ball9, Pose.new(1, 1)) == {:error, "there is no ball9"}
+    assert Pushing.place(world, "ball9", Pose.new(1, 1)) == {:error, "there is no ball9"}
   end
 end
