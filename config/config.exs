@@ -18,6 +18,7 @@ config :swarm,
     patrol: Missions.Patrol,
     flock: Missions.Flock,
     explore: Missions.Explore,
+    chase: Missions.Chase,
     teleop: Missions.Teleop
   ]
 

@@ -9,6 +9,7 @@ defmodule Missions do
   | `patrol` | `Missions.Patrol` | visits points for ever, and takes over those of a robot that has died |
   | `flock` | `Missions.Flock` | keeps together on its way along a course, without a leader |
   | `explore` | `Missions.Explore` | sees all of an unknown building, and makes its map |
+  | `chase` | `Missions.Chase` | surrounds a ball, and brings it to a place |
   | `teleop` | `Missions.Teleop` | is driven by a person |
 
   A mission is fed events, and returns its phase and what is to be done:

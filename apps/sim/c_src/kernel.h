@@ -50,8 +50,10 @@ typedef struct {
     int64_t width, height;
 } sim_sight;
 
+/* Something upright that stands on the floor: round, or a box, whose half_x is not 0; then the radius is that of the
+ * circle round its corners, and its x axis points along the cosine and the sine. */
 typedef struct {
-    double x, y, radius, height;
+    double x, y, radius, height, half_x, half_y, cosine, sine;
     uint8_t kind, paint[3];
 } sim_pole;
 
@@ -134,7 +136,7 @@ typedef struct {
     int32_t *next, *open;
 } sim_regions;
 
-/* Joins pieces to regions. Pieces darker than `least` of their kind (0 or 1) count for nothing. Returns how many
+/* Joins pieces to regions. Pieces darker than `least` of their kind count for nothing. Returns how many
  * regions there are; `order`, with room for as many as there are pieces, has their numbers. */
 size_t sim_join(const sim_piece *pieces, size_t count, const uint8_t *least, const sim_regions *all,
                 int32_t *order);

@@ -9,7 +9,7 @@
 #define MOST_BODIES 100000u
 #define MOST_MARKS 1000u
 
-enum { POLE_BYTES = 4 * sizeof(double) + 4 };
+enum { POLE_BYTES = 8 * sizeof(double) + 4 };
 
 static int number(ErlNifEnv *env, ERL_NIF_TERM term, double least, double most, double *value)
 {
@@ -270,7 +270,7 @@ static ERL_NIF_TERM scan(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return answer(env, result);
 }
 
-/* The poles of a binary: place, radius and height in doubles, then kind and paint in bytes. */
+/* The poles of a binary: place, radius, height, halves and direction in doubles, then kind and paint in bytes. */
 static sim_pole *get_poles(ErlNifEnv *env, ERL_NIF_TERM term, size_t *count)
 {
     ErlNifBinary packed;
@@ -282,12 +282,13 @@ static sim_pole *get_poles(ErlNifEnv *env, ERL_NIF_TERM term, size_t *count)
     sim_pole *poles = enif_alloc((*count + 1) * sizeof(sim_pole));
     for (size_t k = 0; poles != NULL && k < *count; k++) {
         const unsigned char *bytes = packed.data + k * POLE_BYTES;
-        double values[4];
+        double values[8];
         memcpy(values, bytes, sizeof values);
-        poles[k] = (sim_pole){values[0], values[1], values[2], values[3], bytes[32],
-                              {bytes[33], bytes[34], bytes[35]}};
+        poles[k] = (sim_pole){values[0], values[1], values[2], values[3], values[4], values[5],
+                              values[6], values[7], bytes[64], {bytes[65], bytes[66], bytes[67]}};
         if (!sane(values, 2, WORLD) || !within(values[2], 1.0e-3, 100.0) ||
-            !within(values[3], 0.0, 1000.0)) {
+            !within(values[3], 0.0, 1000.0) || !sane(values + 6, 2, 1.0) ||
+            !(values[4] == 0.0 || (within(values[4], 1.0e-3, 100.0) && within(values[5], 1.0e-3, 100.0)))) {
             enif_free(poles);
             return NULL;
         }
@@ -351,7 +352,7 @@ static ERL_NIF_TERM region_term(ErlNifEnv *env, const sim_region *region)
                             enif_make_int64(env, region->height));
 }
 
-/* join(pieces, least): the regions of what look returns; `least` has the lowest brightness of kinds 0 and 1. */
+/* join(pieces, least): the regions of what look returns; `least` has the lowest brightness of each kind. */
 static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
     ErlNifBinary packed, least;
@@ -359,7 +360,7 @@ static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 
     if (argc != 2 || !enif_inspect_binary(env, argv[0], &packed) ||
         packed.size % sizeof(sim_piece) != 0 || packed.size > SIM_WIDEST * SIM_WIDEST ||
-        !enif_inspect_binary(env, argv[1], &least) || least.size != 2)
+        !enif_inspect_binary(env, argv[1], &least) || least.size < 1)
         return enif_make_badarg(env);
 
     const size_t count = packed.size / sizeof(sim_piece);
@@ -378,7 +379,7 @@ static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 
         memcpy(pieces, packed.data, packed.size);
         for (size_t k = 0; k < count; k++)
-            fine = fine && pieces[k].kind < 2 && pieces[k].top <= pieces[k].bottom;
+            fine = fine && pieces[k].kind < least.size && pieces[k].top <= pieces[k].bottom;
         if (fine) {
             rest = enif_make_list(env, 0);
             for (size_t k = sim_join(pieces, count, least.data, &all, order); k > 0; k--)

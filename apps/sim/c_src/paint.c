@@ -7,6 +7,8 @@
 #define NEAREST 0.01
 #define FARTHEST 1.0e6
 #define WALL_HEIGHT 2.5
+/* A ray meets no side that it is as good as parallel to. */
+#define PARALLEL 1.0e-9
 /* The lamp rides beside the camera, 8 degrees to its left. */
 #define LAMP_COSINE 0.9902680687415704
 #define LAMP_SINE 0.13917310096006544
@@ -46,9 +48,36 @@ static sim_span columns(const sim_sight *sight, const sim_pole *pole)
                       clamped(ceiled(right) + 1, -1, sight->width - 1)};
 }
 
+/* Where a ray is between two sides of a box, in multiples of its direction; 0 if nowhere. */
+static int between(double at, double along, double half, double *enters, double *leaves)
+{
+    if (along < PARALLEL && along > -PARALLEL)
+        return at < half && at > -half;
+    double low = (-half - at) / along, high = (half - at) / along;
+    double first = low < high ? low : high, last = low < high ? high : low;
+    *enters = first > *enters ? first : *enters;
+    *leaves = last < *leaves ? last : *leaves;
+    return 1;
+}
+
+/* The depth at which a ray meets a box from outside, negative where it does not. */
+static double meet_box(const sim_sight *sight, const sim_pole *box, double rx, double ry)
+{
+    double mx = sight->x - box->x, my = sight->y - box->y;
+    double enters = -FARTHEST, leaves = FARTHEST;
+
+    if (!between(mx * box->cosine + my * box->sine, rx * box->cosine + ry * box->sine, box->half_x, &enters, &leaves) ||
+        !between(my * box->cosine - mx * box->sine, ry * box->cosine - rx * box->sine, box->half_y, &enters, &leaves) ||
+        !(enters > 0.0 && enters <= leaves))
+        return -1.0;
+    return enters < NEAREST ? NEAREST : enters;
+}
+
 /* The depth at which a ray meets a pole, negative where it does not. */
 static double meet(const sim_sight *sight, const sim_pole *pole, double rx, double ry)
 {
+    if (pole->half_x > 0.0)
+        return meet_box(sight, pole, rx, ry);
     double mx = pole->x - sight->x, my = pole->y - sight->y, r = pole->radius;
     double a = rx * rx + ry * ry, b = mx * rx + my * ry;
     double under = b * b - a * (mx * mx + my * my - r * r);
@@ -58,11 +87,26 @@ static double meet(const sim_sight *sight, const sim_pole *pole, double rx, doub
     return t < NEAREST ? NEAREST : t;
 }
 
+/* Where the side of a box faces on which a ray meets it. */
+static void side(const sim_sight *sight, const sim_pole *box, double rx, double ry, double depth, double *nx, double *ny)
+{
+    double mx = sight->x + rx * depth - box->x, my = sight->y + ry * depth - box->y;
+    double along = (mx * box->cosine + my * box->sine) / box->half_x;
+    double across = (my * box->cosine - mx * box->sine) / box->half_y;
+    double end = along < 0.0 ? -1.0 : 1.0, flank = across < 0.0 ? -1.0 : 1.0;
+    int ends = along * end >= across * flank;
+
+    *nx = ends ? end * box->cosine : 0.0 - flank * box->sine;
+    *ny = ends ? end * box->sine : flank * box->cosine;
+}
+
 static uint8_t luma(const sim_sight *sight, const sim_pole *pole, double rx, double ry,
                     double depth)
 {
     double nx = (sight->x + rx * depth - pole->x) / pole->radius;
     double ny = (sight->y + ry * depth - pole->y) / pole->radius;
+    if (pole->half_x > 0.0)
+        side(sight, pole, rx, ry, depth, &nx, &ny);
     double length = sqrt(rx * rx + ry * ry);
     double lx = (ry * LAMP_SINE - rx * LAMP_COSINE) / length;
     double ly = (0.0 - rx * LAMP_SINE - ry * LAMP_COSINE) / length;

@@ -141,9 +141,14 @@ static void pictures(const sim_map *map, const int8_t *tables)
     uint8_t *picture = exactly((size_t)(width * height / 2 * 3));
 
     direction(&sight.cosine, &sight.sine);
-    for (size_t k = 0; k < count; k++)
-        poles[k] = (sim_pole){place(map->width, map->cell), place(map->height, map->cell),
-                              0.001 + unit(), unit() * 2, k % 2, {205, 75, 137}};
+    for (size_t k = 0; k < count; k++) {
+        /* Every third one is a box. */
+        double half_x = k % 3 ? 0.0 : 0.001 + unit() / 2, half_y = k % 3 ? 0.0 : 0.001 + unit() / 2;
+        double radius = k % 3 ? 0.001 + unit() : half_x + half_y;
+        poles[k] = (sim_pole){place(map->width, map->cell), place(map->height, map->cell), radius, unit() * 2,
+                              half_x, half_y, 1.0, 0.0, k % 4, {205, 75, 137}};
+        direction(&poles[k].cosine, &poles[k].sine);
+    }
     size_t made = sim_look(map, &sight, poles, count, &scratch);
     CHECK(made <= (size_t)width * each);
     for (size_t k = 0; k < made; k++) {

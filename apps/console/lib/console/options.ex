@@ -18,6 +18,8 @@ defmodule Console.Options do
             grey: :wall,
             start: :spread,
             landmark: :default,
+            balls: [],
+            boxes: [],
             moves: [],
             kills: [],
             loss: 0.0,
@@ -100,6 +102,8 @@ defmodule Console.Options do
       bin/demo --headless --move 3,2@40 --picture run.svg   the landmark moves away; see the paths
       bin/demo --headless --map hospital --json -           a report for another program
       bin/demo --map hospital --landmark 0,10.9             a landmark in another room: through the doors
+      bin/demo --landmark none --ball -1,1 --mission 'chase:goal={3,0}' --robots 4
+                                                            four of them bring a ball to a place
       bin/demo --speed 5                                    five times as fast; pause, step, speed max
       bin/demo --nodes --robots 4                           five processes: kill -9 one of them
       bin/demo --nodes --headless --kill leader@40 --json - the same with a report
@@ -115,7 +119,7 @@ defmodule Console.Options do
   def trial(%__MODULE__{} = options) do
     options
     |> Map.take(
-      ~w(robots seed map grey start landmark moves kills loss noise formation assign leader_change blobs hardware)a
+      ~w(robots seed map grey start landmark balls boxes moves kills loss noise formation assign leader_change blobs hardware)a
     )
     |> Map.put(:plan, plan(options))
     |> Map.put(:duration_s, duration_s(options))
@@ -164,6 +168,8 @@ defmodule Console.Options do
        "spread over the map, or all switched on at one pose: same (spread)"},
       {"landmark", "X,Y|none", &landmark/1,
        "where the landmark stands, in metres (the middle, or the nearest\nroom that takes the fleet)"},
+      {"ball", "X,Y", &Parse.point/1, "a ball, which robots can push, lies there; repeatable"},
+      {"box", "X,Y,DEG", &box/1, "a box, which robots can push, stands there; repeatable"},
       {"move", "X,Y@T", &Parse.at(&1, fn text -> Parse.point(text) end, "X,Y@T"),
        "the landmark glides there from second T; repeatable"},
       {"kill", "WHO@T", &Parse.at(&1, fn text -> who(text) end, "leader@T or NAME@T"),
@@ -218,6 +224,8 @@ a fault or a crash, and at keep (not with --nodes)"},
   defp put({"fleet", _robots}, options), do: options
   defp put({"robots", _count}, options), do: options
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
+  defp put({"ball", place}, options), do: %{options | balls: options.balls ++ [place]}
+  defp put({"box", pose}, options), do: %{options | boxes: options.boxes ++ [pose]}
   defp put({"kill", kill}, options), do: %{options | kills: options.kills ++ [kill]}
   defp put({"duration", duration_s}, options), do: %{options | duration_s: duration_s}
   defp put({"page-token-file", token}, options), do: %{options | page_token: token}
@@ -380,6 +388,14 @@ a fault or a crash, and at keep (not with --nodes)"},
 
   defp landmark(text) do
     with {:error, allowed} <- Parse.point(text), do: {:error, allowed <> ", or none"}
+  end
+
+  defp box(text) do
+    with [x, y, degrees] <- String.split(text, ","),
+         {:ok, {x, y}} <- Parse.point("#{x},#{y}"),
+         {:ok, degrees} <- Parse.number(String.trim(degrees), -360, 360),
+         do: {:ok, {x, y, degrees}},
+         else: (_other -> {:error, "X,Y,DEG in metres and degrees"})
   end
 
   defp file("-", "", _folder), do: {:ok, "-"}

@@ -23,6 +23,7 @@ export function paint(floor, colour) {
     if (floor.about && placed.some(([r]) => r.id === floor.about.id)) way(c, view, floor.about);
     if (floor.sonar && floor.about) echoes(c, view, floor.robot(floor.about.id), floor.about);
     ghost(c, floor);
+    for (const object of scene.objects) thing(c, view, object);
     const mark = floor.moving ?? scene.landmark;
     if (mark) triangle(c, ...view.toPixel(...mark));
     for (const [r, hue] of placed) body(c, view, r, hue, r.id === floor.chosen);
@@ -308,6 +309,19 @@ function outline(c, r, x, y, radius) {
   const [scale, cos, sin] = [radius / r.r, Math.cos(r.a), Math.sin(r.a)];
   for (const [ahead, left] of r.box) c.lineTo(x + scale * (ahead * cos - left * sin), y - scale * (ahead * sin + left * cos));
   c.closePath();
+}
+
+// A ball, or a box, to scale.
+export function thing(c, view, { at, r, box }) {
+  c.fillStyle = box.length ? "#1e50e6" : "#e4781e";
+  c.strokeStyle = ink("--text");
+  c.lineWidth = 1;
+  c.beginPath();
+  if (box.length) for (const corner of box) c.lineTo(...view.toPixel(...corner));
+  else c.arc(...view.toPixel(...at), Math.max(r * view.at.scale, 4), 0, 7);
+  c.closePath();
+  c.fill();
+  c.stroke();
 }
 
 // Names above the robots, and below the landmark; on the other side where there is a name already.

@@ -1,5 +1,5 @@
 // The legend of the map.
-import { DOUBT, body, doubt, echoes, slot, triangle, way } from "./drawing.js";
+import { DOUBT, body, doubt, echoes, slot, thing, triangle, way } from "./drawing.js";
 
 // What the signs of the map mean: each is drawn on a small canvas as on the map.
 const SIGNS = [
@@ -13,6 +13,8 @@ const SIGNS = [
   ["goal and way", (c, r) => way(c, r.view, { pose: [-0.5, 0], way: [[0.2, 0]] })],
   ["what a sonar hears", (c, r) => echoes(c, r.view, { ...r, x: -0.4 }, { sonar: [[0, 0, 0, 0.6]], cone: 0.4 })],
   ["landmark", (c) => triangle(c, 18, 13)],
+  ["ball", (c, r) => thing(c, r.view, { at: [0, 0], r: 0.2, box: [] })],
+  ["box", (c, r) => thing(c, r.view, { box: [[-0.5, -0.2], [0.5, -0.2], [0.5, 0.2], [-0.5, 0.2]] })],
 ];
 
 // Fills a list; again where the browser's look has changed.

@@ -33,6 +33,8 @@ defmodule Console.OptionsTest do
              grey: :wall,
              start: :same,
              landmark: {-2.0, 1.0},
+             balls: [],
+             boxes: [],
              moves: options.moves,
              kills: options.kills,
              loss: 0.2,
@@ -46,6 +48,17 @@ defmodule Console.OptionsTest do
              hardware: [:mag1],
              nodes: true
            }
+  end
+
+  test "balls and boxes are given by their places" do
+    {:ok, options} = parse("--ball -1,2 --ball 0,0 --box 3,1.5,-45")
+
+    assert %{balls: [{-1.0, 2.0}, {+0.0, +0.0}], boxes: [{3.0, 1.5, -45.0}]} =
+             Options.trial(options)
+
+    assert error("--ball 1") =~ "X,Y in metres"
+    assert error("--box 1,2") =~ "X,Y,DEG in metres and degrees"
+    assert error("--box 1,2,far") =~ "X,Y,DEG in metres and degrees"
   end
 
   test "hardware is the first robots, or the first of a kind, and runs in real time" do
@@ -232,7 +245,8 @@ defmodule Console.OptionsTest do
   end
 
   test "the help names every option" do
-    for name <- ~w(robots fleet seed map start landmark move kill loss noise formation assign
+    for name <-
+          ~w(robots fleet seed map start landmark ball box move kill loss noise formation assign
                    leader-change duration headless json picture blobs hardware) do
       assert Options.help() =~ "--#{name}"
     end
@@ -247,7 +261,7 @@ defmodule Console.OptionsTest do
     assert options.mission == {Missions.Landmark, of: 4, policy: :majority}
 
     assert error("--mission patorl") ==
-             ~s(--mission: mission "patorl" is not known; expected one of landmark, patrol, flock, explore, teleop; did you mean patrol?)
+             ~s(--mission: mission "patorl" is not known; expected one of landmark, patrol, flock, explore, chase, teleop; did you mean patrol?)
 
     assert error("--mission patrol:period=5") ==
              "--mission: patrol option period: expected a number from 10 to 3600 s, got 5"
@@ -259,6 +273,6 @@ defmodule Console.OptionsTest do
              "--save-map needs a mission that makes a map, such as --mission explore"
 
     assert Options.help() =~
-             ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore or teleop/
+             ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore, chase or teleop/
   end
 end

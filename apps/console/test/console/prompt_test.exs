@@ -150,7 +150,7 @@ defmodule Console.PromptTest do
     assert error("kil leader") =~ "did you mean kill?"
 
     assert error("start patorl") =~
-             "expected one of landmark, patrol, flock, explore, teleop; did you mean patrol?"
+             "expected one of landmark, patrol, flock, explore, chase, teleop; did you mean patrol?"
 
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
@@ -209,6 +209,7 @@ defmodule Console.PromptTest do
              "patrol",
              "flock",
              "explore",
+             "chase",
              "teleop",
              "mag1"
            ]
@@ -218,6 +219,7 @@ defmodule Console.PromptTest do
              "patrol",
              "flock",
              "explore",
+             "chase",
              "teleop"
            ]
 

@@ -92,7 +92,7 @@ defmodule Sim.Compute do
       do: {column, Palette.kind(kind), top, bottom, luma}
   end
 
-  @least <<Palette.least_luma(:landmark), Palette.least_luma(:robot)>>
+  @least for kind <- Palette.kinds(), into: <<>>, do: <<Palette.least_luma(kind)>>
 
   @doc "What a camera sees of poles (or of `pack/1` of them), joined to regions where parts of one kind touch, dark ones left out."
   @spec regions(Sim.Floorplan.t(), CameraFrustum.t(), [CameraFrustum.pole()] | binary()) ::
@@ -138,13 +138,22 @@ defmodule Sim.Compute do
 
   def pack(packed) when is_binary(packed), do: packed
 
-  def pack(poles) when is_list(poles) do
-    for {x, y, r, height, kind} <- poles, into: <<>> do
-      %{paint: {luma, u, v}} = Palette.of(kind)
+  def pack(poles) when is_list(poles), do: for(pole <- poles, into: <<>>, do: pole(pole))
 
-      <<x::float-native, y::float-native, r::float-native, height::float-native,
-        Palette.index(kind), luma, u, v>>
-    end
+  defp pole({x, y, r, height, kind}), do: pole({x, y, r, height}, {0.0, 0.0, 0.0, 0.0}, kind)
+
+  defp pole({%{x: x, y: y, heading: heading}, {half_x, half_y}, height, kind}) do
+    {c, s} = Sim.Trig.cos_sin(heading)
+    round = :math.sqrt(half_x * half_x + half_y * half_y)
+    pole({x, y, round, height}, {half_x, half_y, c, s}, kind)
+  end
+
+  defp pole({x, y, r, height}, {half_x, half_y, c, s}, kind) do
+    %{paint: {luma, u, v}} = Palette.of(kind)
+
+    <<x::float-native, y::float-native, r::float-native, height::float-native,
+      half_x::float-native, half_y::float-native, c::float-native, s::float-native,
+      Palette.index(kind), luma, u, v>>
   end
 
   defp narrow(nil), do: nil

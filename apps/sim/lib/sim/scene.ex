@@ -13,6 +13,7 @@ defmodule Sim.Scene do
   defstruct @enforce_keys ++
               [
                 landmark: nil,
+                objects: [],
                 mission: nil,
                 layer: [],
                 leader: nil,
@@ -55,6 +56,16 @@ defmodule Sim.Scene do
           optional(atom()) => term()
         }
 
+  @typedoc "A ball, with its radius in metres, or a box, with its corners in the frame of the map; `pose` is that of its middle."
+  @type thing :: %{
+          required(:id) => String.t(),
+          required(:kind) => :ball | :box,
+          required(:pose) => Pose.t(),
+          required(:radius) => float() | nil,
+          required(:corners) => [Pose.point()],
+          optional(atom()) => term()
+        }
+
   @typedoc """
   Something that happened to the fleet; the newest is the last of the list. A fleet without an end keeps only the newest, and
   numbers them (`n`).
@@ -76,6 +87,7 @@ defmodule Sim.Scene do
           map: term(),
           robots: [robot()],
           landmark: Pose.point() | nil,
+          objects: [thing()],
           mission: String.t() | nil,
           layer: [tuple()],
           leader: atom() | nil,

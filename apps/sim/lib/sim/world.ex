@@ -1,6 +1,6 @@
 defmodule Sim.World do
   @moduledoc """
-  Models a world of robots, walls and one landmark, as a value. Pure: the same calls give the same world.
+  Models a world of robots, walls, one landmark, and balls and boxes that robots push (`Sim.World.Object`), as a value. Pure: the same calls give the same world.
 
   `step/2` acts, moves and senses. Every sensor is fresh after every step: all sonars fire at once
   and do not disturb each other. Only a lidar has its own period; it sees all of its turn at the end of it. A body is a disc of the profile's radius; it stops at contact and
@@ -16,7 +16,7 @@ defmodule Sim.World do
   alias Sim.{Compute, Floorplan, World}
   alias Sim.World.Body
   alias Sim.Compute.CameraFrustum
-  alias Sim.World.{Bodies, Motion, Touch}
+  alias Sim.World.{Bodies, Motion, Object, Touch}
 
   @landmark_height 1.0
   @table [
@@ -24,6 +24,7 @@ defmodule Sim.World do
     robots: [{:check, &is_list/1, "a list of robots"}, required: true],
     landmark: [{:check, &is_tuple/1, "{x, y} in metres"}, default: nil],
     marks: [{:list, {:check, &Keyword.keyword?/1, "[id: 3, pose: pose]"}}, default: []],
+    objects: [{:list, {:struct, Object}}, default: []],
     seed: [:integer, default: 0],
     noise: [{:one_of, [:off, :default, :slip]}, default: :default],
     start_ms: [:integer, default: 0]
@@ -35,6 +36,7 @@ defmodule Sim.World do
                 step: 0,
                 landmark: nil,
                 marks: [],
+                objects: [],
                 goal: nil,
                 collisions: 0,
                 contacts: [],
@@ -57,6 +59,7 @@ defmodule Sim.World do
           step: non_neg_integer(),
           landmark: Pose.point() | nil,
           marks: [World.Mark.t()],
+          objects: [Object.t()],
           goal: Pose.point() | nil,
           collisions: non_neg_integer(),
           contacts: [contact()],
@@ -68,7 +71,7 @@ defmodule Sim.World do
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
   reading of the wheels (0, 0, 0 unless given), `infrared: true` for a robot with such sensors,
   `wheels:` for errors of its odometry (`Sim.World.Body`). `:marks` are printed marks, by the options of
-  `Sim.World.Mark.new!/1`; cameras see them in painted pictures. Wrong options raise `ArgumentError`.
+  `Sim.World.Mark.new!/1`; cameras see them in painted pictures. `:objects` are balls and boxes. Wrong options raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -92,6 +95,7 @@ defmodule Sim.World do
       at_ms: options[:start_ms],
       order: ids,
       marks: Enum.map(options[:marks], &World.Mark.new!/1),
+      objects: options[:objects],
       robots: Elixir.Map.new(bodies, &{&1.id, &1})
     }
     |> place_landmark(options[:landmark])
@@ -191,23 +195,23 @@ defmodule Sim.World do
   end
 
   @typedoc "Everything upright that is in the world now, once for all cameras."
-  @opaque scenery :: {landmark :: binary(), robots :: binary()}
+  @opaque scenery :: {things :: binary(), robots :: binary()}
 
   @doc "What the cameras of all robots see now, for `detections/3` and `frame/3`."
   @spec scenery(t()) :: scenery()
   def scenery(%__MODULE__{} = world) do
     robots = for id <- world.order, do: pole(world.robots[id])
-    {Compute.pack(landmark_pole(world)), Compute.pack(robots)}
+    {Compute.pack(things(world)), Compute.pack(robots)}
   end
 
   defp others(world, body, nil), do: poles(world, body.id)
 
-  # A robot does not see itself; the landmark comes first, as in `poles/2`.
-  defp others(world, %{index: index}, {landmark, robots}) do
+  # A robot does not see itself; what is no robot comes first, as in `poles/2`.
+  defp others(world, %{index: index}, {things, robots}) do
     size = div(byte_size(robots), length(world.order))
     before = binary_part(robots, 0, index * size)
     behind = binary_part(robots, (index + 1) * size, byte_size(robots) - (index + 1) * size)
-    landmark <> before <> behind
+    things <> before <> behind
   end
 
   @doc "The same with the camera's current direction, as a detector would return it."
@@ -243,7 +247,7 @@ defmodule Sim.World do
     }
   end
 
-  @doc "The colours of the landmark, `YellowLandmark`, and of robots, `RedRobot`."
+  @doc "The colours of the landmark, `YellowLandmark`, of robots, `RedRobot`, of balls, `OrangeBall`, and of boxes, `BlueBox`."
   @spec colours() :: Vision.Colours.t()
   defdelegate colours, to: Sim.Compute.Palette
 
@@ -260,11 +264,13 @@ defmodule Sim.World do
   # Everything upright that robot `id` can see.
   defp poles(%__MODULE__{} = world, id) do
     robots = for other <- world.order, other != id, do: pole(world.robots[other])
-    landmark_pole(world) ++ robots
+    things(world) ++ robots
   end
 
   defp pole(%Body{pose: pose, profile: profile}),
     do: {pose.x, pose.y, profile.radius, profile.height, :robot}
+
+  defp things(world), do: landmark_pole(world) ++ Enum.map(world.objects, &Object.pole/1)
 
   defp landmark_pole(%{landmark: nil}), do: []
 

@@ -79,19 +79,21 @@ defmodule Sim.ComputeTest do
   end
 
   defp poles(map, count) do
-    for _ <- 1..count//1, {x, y} = place(map), into: <<>> do
-      <<x::float-native, y::float-native, 0.05 + :rand.uniform() / 2::float-native,
-        0.2 + :rand.uniform()::float-native, :rand.uniform(2) - 1, 205, 75, 137>>
-    end
-    # All objects of a kind are painted alike.
-    |> repaint()
-  end
+    poles =
+      for _ <- 1..count//1, {x, y} = place(map) do
+        case :rand.uniform(4) do
+          4 ->
+            halves = {0.1 + :rand.uniform(), 0.05 + :rand.uniform() / 2}
+            quarter = Enum.random([0.0, :math.pi() / 2, 7 * :rand.uniform()])
+            {Hal.Pose.new(x, y, quarter), halves, 0.1 + :rand.uniform(), :box}
 
-  defp repaint(poles) do
-    for <<shape::binary-size(32), kind, _paint::binary-size(3) <- poles>>, into: <<>> do
-      <<shape::binary, kind,
-        if(kind == 0, do: <<205, 75, 137>>, else: <<100, 100, 210>>)::binary>>
-    end
+          round ->
+            kind = Enum.at([:landmark, :robot, :ball], round - 1)
+            {x, y, 0.05 + :rand.uniform() / 2, 0.2 + :rand.uniform(), kind}
+        end
+      end
+
+    Compute.pack(poles)
   end
 
   # Some are near the camera, so that pictures are full of them.
@@ -239,12 +241,12 @@ defmodule Sim.ComputeTest do
           rows = Enum.sort(Enum.take_random(0..30, 2 * :rand.uniform(4)), :desc)
 
           for [bottom, top] <- Enum.chunk_every(rows, 2), into: <<>> do
-            <<column::16-native, top::16-native, bottom::16-native, :rand.uniform(2) - 1,
+            <<column::16-native, top::16-native, bottom::16-native, :rand.uniform(4) - 1,
               :rand.uniform(255)>>
           end
         end
 
-      least = <<:rand.uniform(120), :rand.uniform(120)>>
+      least = for _ <- 1..4, into: <<>>, do: <<:rand.uniform(120)>>
       assert Compute.Native.join(pieces, least) == Reference.join(pieces, least)
     end
 
@@ -316,7 +318,7 @@ defmodule Sim.ComputeTest do
     badarg.(fn -> Compute.Native.sonar_few(map, <<>>, [] ++ :tail, nil) end)
     badarg.(fn -> Compute.Native.look(map, put_elem(sight, 7, 5000), <<>>) end)
     badarg.(fn -> Compute.Native.look(map, put_elem(sight, 8, 3), <<>>) end)
-    badarg.(fn -> Compute.Native.look(map, sight, <<0::288>>) end)
+    badarg.(fn -> Compute.Native.look(map, sight, <<0::544>>) end)
     badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [], nil, <<tables::binary, 0>>) end)
     badarg.(fn -> Compute.Native.paint(map, put_elem(sight, 5, 0.0), <<>>, [], nil, tables) end)
     mark = {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 2, <<0, 1, 1, 0>>}

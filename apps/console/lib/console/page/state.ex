@@ -97,6 +97,7 @@ defmodule Console.Page.State do
       formed: scene.formed?,
       estop: Format.estop(scene),
       landmark: point(scene.landmark),
+      objects: Enum.map(scene.objects, &object/1),
       robots: Enum.map(scene.robots, &robot/1),
       told: Scene.told(scene.stages),
       stages: scene.stages |> Enum.take(-@stages) |> Enum.map(&stage/1)
@@ -170,6 +171,15 @@ defmodule Console.Page.State do
 
   defp words(:estop_holds), do: "emergency stop"
   defp words(name), do: name |> to_string() |> String.replace("_", " ")
+
+  defp object(%{id: id, kind: kind, pose: pose, radius: radius, corners: corners}),
+    do: %{
+      id: id,
+      kind: kind,
+      at: point(Hal.Pose.point(pose)),
+      r: round3(radius),
+      box: Enum.map(corners, &point/1)
+    }
 
   defp point(nil), do: nil
   defp point({x, y}), do: [round3(x), round3(y)]

@@ -53,6 +53,7 @@ defmodule Console.Picture.Floor do
         Enum.map(track.first.robots, &start(&1, colours, at, scale)),
         slots(ground, track.last, colours, at, scale),
         landmark(track.last.landmark, at, scale),
+        Enum.map(track.last.objects, &object(&1, at, scale)),
         Enum.map(track.last.robots, &uncertainty(&1, colours, at, scale)),
         track.last |> astray() |> Enum.map(&believed(&1, colours, at, scale)),
         Enum.map(track.last.robots, &robot(&1, colours, at, scale)),
@@ -304,6 +305,22 @@ defmodule Console.Picture.Floor do
       stroke_width: width
     )
   end
+
+  @doc "A ball or a box, to scale; `at` gives the pixels of a place."
+  @spec object(Sim.Scene.thing(), (Pose.point() -> {float(), float()}), float()) :: iodata()
+  def object(%{kind: :ball, pose: pose, radius: radius}, at, scale) do
+    {x, y} = at.(Pose.point(pose))
+    Svg.element(:circle, [cx: x, cy: y, r: max(radius * scale, 4.0)] ++ object_look("#E4781E"))
+  end
+
+  def object(%{kind: :box, corners: corners}, at, _scale),
+    do:
+      Svg.element(
+        :polygon,
+        [points: corners |> Enum.map(at) |> Svg.points()] ++ object_look("#1E50E6")
+      )
+
+  defp object_look(fill), do: [fill: fill, stroke: @ink, stroke_width: 1]
 
   defp landmark(nil, _at, _scale), do: []
 

@@ -110,6 +110,18 @@ defmodule Console.Picture.Legend do
 
   defp rows(rows, colour), do: for(row <- rows, row != "", do: {String.trim(row), colour})
 
+  defp object?(%{last: %{objects: objects}}, kind), do: Enum.any?(objects, &(&1.kind == kind))
+
+  defp object(y, kind) do
+    corners = for {dx, dy} <- [{-9, -4}, {9, -4}, {9, 4}, {-9, 4}], do: {15.0 + dx, y + dy}
+
+    Floor.object(
+      %{kind: kind, pose: Hal.Pose.new(15.0, y), radius: 5.0, corners: corners},
+      & &1,
+      1.0
+    )
+  end
+
   # Those that the drawing has.
   defp signs(ground, %{last: %{robots: robots}} = track) do
     disc = &Svg.element(:circle, [cx: 15, cy: &1] ++ &2)
@@ -130,6 +142,8 @@ defmodule Console.Picture.Legend do
       {"how far off that may be, by its own word", Enum.any?(robots, &Floor.doubt?/1),
        &Floor.doubt(15.0, &1, 9.0, @soft)},
       {"landmark", track.landmark != [], &Floor.diamond(15.0, &1, 7.0)},
+      {"ball", object?(track, :ball), &object(&1, :ball)},
+      {"box", object?(track, :box), &object(&1, :box)},
       {"not known, taken for wall", ground.unknown? != nil,
        &Svg.element(:rect, x: 8, y: &1 - 7, width: 14, height: 14, fill: Walls.unknown())}
     ]

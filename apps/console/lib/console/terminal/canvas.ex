@@ -50,6 +50,7 @@ defmodule Console.Terminal.Canvas do
       Map.new(floor.walls, fn {at, text} -> {at, {text, :wall}} end)
       |> put_slots(floor, scene)
       |> put_landmark(floor, scene.landmark)
+      |> put_objects(floor, scene)
 
     bodies =
       scene.robots |> Enum.sort_by(& &1.leader?) |> Enum.reduce(cells, &put_robot(&2, floor, &1))
@@ -78,7 +79,7 @@ defmodule Console.Terminal.Canvas do
     else
       places =
         for(%{alive: true} = robot <- scene.robots, do: Pose.point(robot.pose)) ++
-          List.wrap(scene.landmark)
+          List.wrap(scene.landmark) ++ Enum.map(scene.objects, &Pose.point(&1.pose))
 
       {left, bottom, right, top} = MapView.around(ground, places, 1.0, {8.0, 8.0})
       {outward(left, -1), outward(bottom, -1), outward(right, 1), outward(top, 1)}
@@ -145,6 +146,18 @@ defmodule Console.Terminal.Canvas do
 
   defp put_landmark(cells, floor, place),
     do: put(cells, floor, cell(floor, place), {"◆", :landmark})
+
+  defp put_objects(cells, floor, scene) do
+    for %{kind: kind, pose: pose} <- scene.objects, reduce: cells do
+      cells ->
+        put(
+          cells,
+          floor,
+          cell(floor, Pose.point(pose)),
+          {if(kind == :ball, do: "●", else: "■"), :landmark}
+        )
+    end
+  end
 
   defp put_robot(cells, floor, robot) do
     text = if robot.alive, do: arrow(robot.pose.heading), else: "✗"

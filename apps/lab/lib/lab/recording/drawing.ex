@@ -18,6 +18,8 @@ defmodule Lab.Recording.Drawing do
   @living {0.20, 0.45, 0.80, 1}
   @dead {0.50, 0.50, 0.50, 1}
   @landmark {0.95, 0.85, 0.10, 1}
+  @ball {0.89, 0.47, 0.08, 1}
+  @box {0.12, 0.31, 0.9, 1}
   @layer {0.40, 0.40, 0.45, 0.8}
   @mapped {0.40, 0.40, 0.45, 0.2}
   @slot {0.20, 0.70, 0.30, 0.5}
@@ -90,7 +92,7 @@ defmodule Lab.Recording.Drawing do
     Foxglove.frame_transforms(ns, transforms)
   end
 
-  @doc "Bodies, the landmark, the places in the formation, and what the mission draws, all of them each time."
+  @doc "Bodies, the landmark, balls and boxes, the places in the formation, and what the mission draws, all of them each time."
   @spec scene(non_neg_integer(), Scene.t()) :: iodata()
   def scene(ns, scene) do
     entities =
@@ -100,6 +102,7 @@ defmodule Lab.Recording.Drawing do
           do: entity(ns, "place of #{robot.id}", [Drawing.spot({x, y}, @slot)])
         ) ++
         for({x, y} <- List.wrap(scene.landmark), do: entity(ns, "landmark", pole({x, y}))) ++
+        for(object <- scene.objects, do: entity(ns, object.id, object(object))) ++
         for sign <- scene.layer, do: entity(ns, elem(sign, 1), sign(sign))
 
     Foxglove.scene_update(entities, [Bodies.delete_all(ns)])
@@ -129,6 +132,12 @@ defmodule Lab.Recording.Drawing do
   defp colour(%{alive: false}), do: @dead
   defp colour(%{leader?: true}), do: @leader
   defp colour(_robot), do: @living
+
+  defp object(%{kind: :ball, pose: %{x: x, y: y}, size: r}),
+    do: [Bodies.cylinder({{x, y, r}, 0}, {2 * r, 2 * r, 2 * r}, @ball)]
+
+  defp object(%{pose: pose, size: {length, width}, height: height}),
+    do: [Bodies.cube({{pose.x, pose.y, height / 2}, pose.heading}, {length, width, height}, @box)]
 
   defp pole({x, y}), do: [Bodies.cylinder({{x, y, 0.5}, 0}, {0.3, 0.3, 1.0}, @landmark)]
 

@@ -53,6 +53,7 @@ defmodule Lab.Trial.Evaluation do
       at_ms: run.at_ms,
       map: run.world.map,
       landmark: run.world.landmark,
+      objects: Enum.map(run.world.objects, &World.Object.thing/1),
       robots: robots,
       mission: most(for {_id, %{mission: module}} <- Enum.sort(run.claims), do: module),
       layer: layer([leader | run.options.robots], &run.claims[&1][:layer]),

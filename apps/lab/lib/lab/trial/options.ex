@@ -10,6 +10,7 @@ defmodule Lab.Trial.Options do
 
   @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
           "{x, y} in metres"}
+  @pose {:tuple, List.duplicate({:number, -1.0e4, 1.0e4}, 3), "{x, y, degrees}"}
   # The options of the mission, without those that the robots know themselves.
   @mission [formation: {:column, 1.0}, assign: :cost, leader_change: true, policy: :available] ++
              [of: nil, lost_link: nil]
@@ -73,6 +74,8 @@ defmodule Lab.Trial.Options do
       start: [{:one_of, [:spread, :same]}, default: :spread],
       landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
       marks: [{:or, nil, {:keys, marks()}}, default: nil],
+      balls: [{:list, @place}, default: []],
+      boxes: [{:list, @pose}, default: []],
       moves: [{:check, &moves?/1, "[{{x, y}, at_s}]"}, default: []],
       kills: [{:check, &kills?/1, "[{robot, at_s}]"}, default: []],
       script: [Event.script_type(), default: []],
@@ -94,15 +97,11 @@ defmodule Lab.Trial.Options do
 
   # Where each hangs, and where it faces: in metres and degrees.
   defp marks do
-    place = List.duplicate({:number, -1.0e4, 1.0e4}, 3)
-
     Vision.Marks.table()
     |> Keyword.merge(
       height: {:number, 0.0, 100.0, "m"},
       at: [
-        {:list,
-         {:tuple, [{:integer, 0, 65_535}, {:tuple, place, "{x, y, degrees}"}],
-          "{id, {x, y, degrees}}"}},
+        {:list, {:tuple, [{:integer, 0, 65_535}, @pose], "{id, {x, y, degrees}}"}},
         required: true
       ]
     )

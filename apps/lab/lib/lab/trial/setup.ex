@@ -6,7 +6,13 @@ defmodule Lab.Trial.Setup do
   alias Hal.{Pose, Profile}
   alias Lab.Trial.Options
   alias Sim.World
+  alias Sim.World.Object
   alias Vision.Marks
+
+  # How often starts are drawn again, and how far from objects they must be.
+  @draws 50
+  @next_seed 1_000_003
+  @beside 0.1
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys ++ [plan: nil]
@@ -33,7 +39,8 @@ defmodule Lab.Trial.Setup do
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
-  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}]]`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}]]`), `balls` (`[{x, y}]`) and `boxes`
+  (`[{x, y, degrees}]`) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -71,9 +78,10 @@ defmodule Lab.Trial.Setup do
          :ok <- at(["landmark"], check_landmarks(map, asked)),
          :ok <- at(["moves"], check_landmarks(map, moves)),
          :ok <- at(["marks"], check_marks(options)),
+         :ok <- check_objects(map, objects(options)),
          :ok <- check_script(map, options),
          {:ok, landmark, starts} <-
-           at(["map"], Sim.Floorplan.places(map, bodies, options.seed, landmark)) do
+           at(["map"], places(map, bodies, options, landmark)) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
   end
@@ -135,6 +143,44 @@ defmodule Lab.Trial.Setup do
     end
   end
 
+  defp objects(options) do
+    balls =
+      for {{x, y}, n} <- Enum.with_index(options.balls, 1),
+          do: [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)]
+
+    boxes =
+      for {{x, y, degrees}, n} <- Enum.with_index(options.boxes, 1),
+          do: [id: "box#{n}", kind: :box, pose: Pose.new(x, y, degrees * :math.pi() / 180)]
+
+    Enum.map(balls ++ boxes, &Object.new!/1)
+  end
+
+  defp check_objects(map, objects) do
+    Enum.find_value(objects, :ok, fn %{id: id, kind: kind, pose: pose} = object ->
+      unless Object.free?(object, map) do
+        n = String.replace_prefix(id, "#{kind}", "")
+        line = "#{id} cannot be at #{pose.x},#{pose.y} of map #{map.name}: there is a wall"
+        at([if(kind == :ball, do: "balls", else: "boxes"), n], {:error, line})
+      end
+    end)
+  end
+
+  # Of the starts that further seeds give, the first at which no robot stands on an object.
+  defp places(map, bodies, %{seed: seed} = options, landmark) do
+    objects = objects(options)
+
+    Enum.find_value(0..@draws, fn draw ->
+      with {:ok, _landmark, starts} = places <-
+             Sim.Floorplan.places(map, bodies, seed + draw * @next_seed, landmark) do
+        stands? = fn {{_id, radius}, %{x: x, y: y}} ->
+          Enum.any?(objects, &(elem(Object.gap(&1, {x, y, radius}), 0) < @beside))
+        end
+
+        if draw == @draws or not Enum.any?(Enum.zip(bodies, starts), stands?), do: places
+      end
+    end)
+  end
+
   # Places that a script names, which depend on the map.
   defp check_script(map, options) do
     options.script
@@ -171,6 +217,7 @@ defmodule Lab.Trial.Setup do
         noise: options.noise,
         landmark: landmark,
         marks: hung(options.marks),
+        objects: objects(options),
         robots:
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)

@@ -1,6 +1,7 @@
 defmodule Robot.Percept.SightingTest do
   @moduledoc "What a picture shows of a colour, and how far away that is, is one answer for all that ask."
   use ExUnit.Case, async: true
+  doctest Robot.Percept.Ground
   alias Hal.Profile
   alias Robot.Percept
   alias Robot.Percept.Sighting

@@ -21,9 +21,11 @@ defmodule Sim.Compute.CameraFrustum do
           height: pos_integer()
         }
 
-  @typedoc "Something upright and round: place, radius, height, and what it is."
+  @typedoc "Something upright and round: place, radius, height, and what it is; or a box: pose, half its length and width, height."
   @type pole ::
           {float(), float(), radius :: float(), height :: float(), Sim.Compute.Palette.kind()}
+          | {Hal.Pose.t(), {half_x :: float(), half_y :: float()}, height :: float(),
+             Sim.Compute.Palette.kind()}
 
   @doc "The camera of a body of a world, with pictures of the profile's size."
   @spec of(Sim.World.Body.t()) :: t()

@@ -107,12 +107,12 @@ defmodule Sim.Compute.Marks do
     {wall, _axis} = Rays.wall(map, sx, sy, rx, ry, depth)
 
     unless wall < depth do
-      for {range, {x, y, r, pole, _paint}} <- poles,
+      for {range, pole} <- poles,
           column in range,
-          at = Sim.Compute.Columns.meet({sx, sy}, {x, y, r}, rx, ry),
+          at = Sim.Compute.Columns.meet({sx, sy}, pole, rx, ry),
           at < depth,
           reduce: height,
-          do: (above -> min(above, ceil(horizon - focal * (pole - eye) / at)))
+          do: (above -> min(above, ceil(horizon - focal * (elem(pole, 3) - eye) / at)))
     end
   end
 

@@ -108,7 +108,7 @@ defmodule Sim.Compute.Reference do
   end
 
   @doc "See `Sim.Compute.Regions`."
-  @spec join(binary(), <<_::16>>) :: [Sim.Compute.Regions.t()]
+  @spec join(binary(), binary()) :: [Sim.Compute.Regions.t()]
   defdelegate join(pieces, least), to: Sim.Compute.Regions
 
   @doc "See `Sim.Compute.paint/4`."

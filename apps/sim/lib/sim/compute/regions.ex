@@ -8,7 +8,7 @@ defmodule Sim.Compute.Regions do
   of their rows. They are whole numbers, so that the order of its pieces does not matter.
   """
   @type t :: {
-          kind :: 0..1,
+          kind :: byte(),
           area :: pos_integer(),
           left :: non_neg_integer(),
           right :: non_neg_integer(),
@@ -26,11 +26,11 @@ defmodule Sim.Compute.Regions do
       iex> Sim.Compute.Regions.join(pieces, <<0, 30>>)
       [{1, 8, 9, 9, 0, 7, 72, 56}, {1, 5, 3, 4, 5, 7, 17, 62}]
   """
-  @spec join(binary(), least :: <<_::16>>) :: [t()]
-  def join(pieces, <<landmark, robot>>) do
+  @spec join(binary(), least :: binary()) :: [t()]
+  def join(pieces, least) do
     regions(
       for <<column::16-native, top::16-native, bottom::16-native, kind, luma <- pieces>>,
-          luma >= if(kind == 0, do: landmark, else: robot),
+          luma >= :binary.at(least, kind),
           do: {column, kind, top, bottom}
     )
   end

@@ -24,9 +24,10 @@ defmodule Sim.World.Blobs do
     map
     |> Compute.regions(sight, poles)
     |> Enum.with_index()
-    |> Enum.map(fn {region, k} -> blob(region, sight, noise, k) end)
-    |> Enum.filter(&(&1.area >= @least_area))
-    |> Enum.sort_by(&{&1.colour != "YellowLandmark", -&1.area, &1.left, &1.top})
+    |> Enum.map(fn {region, k} -> {elem(region, 0), blob(region, sight, noise, k)} end)
+    |> Enum.filter(fn {_kind, blob} -> blob.area >= @least_area end)
+    |> Enum.sort_by(fn {kind, blob} -> {kind, -blob.area, blob.left, blob.top} end)
+    |> Enum.map(&elem(&1, 1))
   end
 
   defp blob({index, exact, left, right, top, bottom, columns, rows}, sight, noise, k) do

@@ -1,6 +1,6 @@
 defmodule Sim.World.Bodies do
   @moduledoc "Lists the solid objects of a world as discs. Pure."
-  alias Sim.World.{Body, Contact}
+  alias Sim.World.{Body, Contact, Object}
 
   @landmark_radius 0.15
 
@@ -24,6 +24,15 @@ defmodule Sim.World.Bodies do
   @spec pole(Sim.World.t()) :: [Contact.disc()]
   def pole(%{landmark: nil}), do: []
   def pole(%{landmark: {x, y}}), do: [{x, y, @landmark_radius}]
+
+  @doc "Whether an object has room where it is, among walls, robots, the landmark and other objects."
+  @spec room?(Sim.World.t(), Object.t(), [Object.t()]) :: boolean()
+  def room?(world, object, others) do
+    discs = Enum.map(all(world), &disc/1) ++ pole(world) ++ Enum.flat_map(others, &Object.discs/1)
+
+    Object.free?(object, world.map) and
+      Enum.all?(discs, &(elem(Object.gap(object, &1), 0) >= 0.0))
+  end
 
   @doc "Whether a robot's body would touch another one, or the landmark, at this place. A wall is refused before the run."
   @spec occupied?(Sim.World.t(), atom(), Hal.Pose.point()) :: boolean()

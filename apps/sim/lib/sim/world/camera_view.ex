@@ -16,9 +16,9 @@ defmodule Sim.World.CameraView do
   """
   @type ground :: World.t()
 
-  @typedoc "Step, time, landmark, poses in the order of the fleet; pan, tilt and field of view of the robot's camera."
+  @typedoc "Step, time, landmark, balls and boxes, poses in the order of the fleet; pan, tilt and field of view of the robot's camera."
   @type moving ::
-          {step :: non_neg_integer(), at_ms :: integer(), Pose.point() | nil,
+          {step :: non_neg_integer(), at_ms :: integer(), Pose.point() | nil, [World.Object.t()],
            [{float(), float(), float()}],
            {pan :: float(), tilt :: float(), field_of_view :: float()}}
 
@@ -41,19 +41,21 @@ defmodule Sim.World.CameraView do
   @spec moving(World.t(), [{float(), float(), float()}], World.id()) :: moving()
   def moving(%World{} = world, poses, id) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Map.fetch!(world.robots, id)
-    {world.step, world.at_ms, world.landmark, poses, {pan, tilt, angle}}
+    {world.step, world.at_ms, world.landmark, world.objects, poses, {pan, tilt, angle}}
   end
 
   @doc "The world as the camera of robot `id` sees it."
   @spec world(ground(), moving(), World.id()) :: World.t()
-  def world(%World{} = ground, {step, at_ms, landmark, poses, {pan, tilt, angle}}, id) do
+  def world(%World{} = ground, {step, at_ms, landmark, objects, poses, ptz}, id) do
+    {pan, tilt, angle} = ptz
+
     robots =
       for {other, {x, y, heading}} <- Enum.zip(ground.order, poses), into: %{} do
         {other, %{ground.robots[other] | pose: %Pose{x: x, y: y, heading: heading}}}
       end
 
     robots = Map.update!(robots, id, &%{&1 | pan: pan, tilt: tilt, field_of_view: angle})
-    %{ground | step: step, at_ms: at_ms, landmark: landmark, robots: robots}
+    %{ground | step: step, at_ms: at_ms, landmark: landmark, objects: objects, robots: robots}
   end
 
   # A camera sees only the outline of the others.

@@ -10,7 +10,7 @@ defmodule Sim.World.Snapshot do
   alias Sim.World
   alias Sim.World.Body
 
-  @moving ~w(step at_ms landmark goal collisions contacts min_separation together)a
+  @moving ~w(step at_ms landmark objects goal collisions contacts min_separation together)a
   @body ~w(pose odometry alive wanted ramp speed measured turn look pan tilt field_of_view pressed)a
 
   @type t :: {[term()], [[term()]]}
