@@ -68,7 +68,7 @@ defmodule Sim.World do
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
   reading of the wheels (0, 0, 0 unless given), `infrared: true` for a robot with such sensors,
   `wheels:` for errors of its odometry (`Sim.World.Body`). `:marks` are printed marks, by the options of
-  `Sim.World.Mark.new!/1`; cameras see them in painted pictures. Wrong options raise `ArgumentError`.
+  `Sim.World.Mark.new!/1`; cameras see them. Wrong options raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -210,7 +210,7 @@ defmodule Sim.World do
     landmark <> before <> behind
   end
 
-  @doc "The same with the camera's current direction, as a detector would return it."
+  @doc "The same with the camera's current direction, as a detector would return it, and the marks that it would read; `nil` in a world without."
   @spec detections(t(), id(), scenery() | nil) :: Vision.Detections.t()
   def detections(%__MODULE__{} = world, id, scenery \\ nil) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Elixir.Map.fetch!(world.robots, id)
@@ -218,10 +218,25 @@ defmodule Sim.World do
     %Vision.Detections{
       at_ms: world.at_ms,
       blobs: blobs(world, id, scenery),
+      marks: read(world, id),
       pan: pan,
       tilt: tilt,
       field_of_view: angle
     }
+  end
+
+  defp read(%{marks: []}, _id), do: nil
+
+  defp read(world, id) do
+    body = Elixir.Map.fetch!(world.robots, id)
+    sight = CameraFrustum.of(body)
+    taken = Elixir.Map.take(body, [:pan, :tilt, :field_of_view])
+
+    frame =
+      Elixir.Map.merge(taken, %{at_ms: world.at_ms, width: sight.width, height: sight.height})
+
+    noise = if world.noise != :off, do: {world.seed, body.index, world.step}
+    World.MarkReadings.see(world.map, sight, poles(world, id), world.marks, frame, noise)
   end
 
   @doc "The picture of a robot's camera, in its current direction."

@@ -92,19 +92,16 @@ defmodule Lab.Trial.Options do
     ]
   end
 
-  # Where each hangs, and where it faces: in metres and degrees.
+  # Where each hangs, and where it faces: in metres and degrees. What the robots are told of that may be wrong.
   defp marks do
-    place = List.duplicate({:number, -1.0e4, 1.0e4}, 3)
+    place = {:tuple, List.duplicate({:number, -1.0e4, 1.0e4}, 3), "{x, y, degrees}"}
+    list = {:list, {:tuple, [{:integer, 0, 65_535}, place], "{id, {x, y, degrees}}"}}
 
     Vision.Marks.table()
     |> Keyword.merge(
       height: {:number, 0.0, 100.0, "m"},
-      at: [
-        {:list,
-         {:tuple, [{:integer, 0, 65_535}, {:tuple, place, "{x, y, degrees}"}],
-          "{id, {x, y, degrees}}"}},
-        required: true
-      ]
+      at: [list, required: true],
+      known: {:or, :all, list}
     )
   end
 
@@ -135,15 +132,10 @@ defmodule Lab.Trial.Options do
              "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
                Suggest.hint(inspect(who), robots)}
 
-    direct =
-      if options.marks != nil and options.blobs == :direct,
-        do: [{["marks"], "are seen in painted pictures only, blobs: :painted"}],
-        else: []
-
     cut? = Cuts.valid?(options.cuts, robots)
 
     if(cut?, do: [], else: [{["cuts"], cuts <> Wording.show(options.cuts)}]) ++
-      direct ++ kills ++ Event.problems(options.script, robots)
+      kills ++ Event.problems(options.script, robots)
   end
 
   @doc """

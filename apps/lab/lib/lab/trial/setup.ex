@@ -33,7 +33,8 @@ defmodule Lab.Trial.Setup do
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
-  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}]]`), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}], known: :all]`; `known` are those of
+  which they are told where they hang, `[]` by default), `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -92,6 +93,7 @@ defmodule Lab.Trial.Setup do
           mission: setup.mission,
           colours: World.colours(),
           plan: setup.plan,
+          marks: robot.profile.camera && looked_for(options),
           seed: options.seed,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
@@ -111,12 +113,19 @@ defmodule Lab.Trial.Setup do
   @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
   @spec looked_for(map()) :: keyword() | nil
   def looked_for(%{marks: nil}), do: nil
-  def looked_for(%{marks: marks}), do: Keyword.take(marks, [:family, :size])
+
+  def looked_for(%{marks: marks}) do
+    known = Keyword.get(marks, :known, [])
+    known = if known == :all, do: marks[:at], else: known
+    known = for {id, {x, y, degrees}} <- known, do: {id, {x, y, degrees * :math.pi() / 180}}
+    Keyword.take(marks, [:family, :size]) ++ [known: known]
+  end
 
   defp check_marks(%{marks: nil}), do: :ok
 
-  defp check_marks(%{marks: given} = options) do
-    with :ok <- Marks.available(), {:ok, %{family: family}} <- Marks.new(looked_for(options)) do
+  defp check_marks(%{marks: given}) do
+    with :ok <- Marks.available(),
+         {:ok, %{family: family}} <- Marks.new(Keyword.take(given, [:family, :size])) do
       unknown = fn {id, _at} -> Marks.Native.picture(family, id) == nil end
 
       case Enum.find(given[:at], unknown) do

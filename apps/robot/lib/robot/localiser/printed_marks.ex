@@ -1,0 +1,197 @@
+defmodule Robot.Localiser.PrintedMarks do
+  @moduledoc """
+  Corrects a robot's pose by printed marks whose places it was told (`Robot.Config`, `marks: [known: …]`), and finds it again by
+  them. Pure; on a `Robot.Localiser`.
+
+  A mark counts when it was read in three frames in a row. Its range, its bearing and, where it is told, its yaw are measurements
+  of the extended Kalman filter `Robot.Localiser.Belief`, each as exact as the reading says and as the place of a mark is known.
+  They never make the pose surer than that.
+
+  A mark may hang elsewhere than the robot was told. One that contradicts the belief by more than three standard deviations does
+  not correct it. Poses from which it would look like this are kept instead (`Robot.Localiser.PrintedMarks.Hypotheses`), and go
+  with the wheels. A robot that is lost, or unsure of its place by a metre, takes the place of these as soon as they are one place.
+  Any other needs a second mark that fits there, so that no single mark carries it off; a mark that fits the belief ends them.
+  """
+  alias Hal.Pose
+  alias Robot.Localiser.{Belief, Frame, MonteCarlo, PlanFilter, Walls}
+  alias Robot.Localiser.PrintedMarks.Hypotheses
+  alias Robot.Percept
+  alias Vision.Mark
+  alias Vision.Marks.Streaks
+
+  # How exactly people measure where a mark hangs (metres), and how it is turned (radians).
+  @place_sd 0.03
+  @turn_sd 0.03
+  # What the pose is known to is not improved (metres, radians).
+  @exact 0.04
+  @exact_turn 0.01
+  # Pictures that follow one another have errors in common, so that this many count as one.
+  @repeated 3
+  @gate 9.0
+  # Vaguer than this (metres, radians), a belief is no line beside which a measurement could be bent.
+  @vague {1.0, 0.5}
+  @near 0.2
+
+  defstruct known: %{}, streaks: %{}, hypotheses: nil
+
+  @typedoc "Where the marks hang and face, which were read of late, and where the robot may be by those that contradict its belief."
+  @type t :: %__MODULE__{
+          known: %{Mark.id() => Pose.t()},
+          streaks: Streaks.t(),
+          hypotheses: Hypotheses.t() | nil
+        }
+
+  @doc """
+  What a robot is told of marks: `[{id, {x, y, heading}}]` (metres, radians).
+
+      iex> Robot.Localiser.PrintedMarks.new([{7, {1.0, 2.0, 0.5}}]).known
+      %{7 => Hal.Pose.new(1.0, 2.0, 0.5)}
+  """
+  @spec new([{non_neg_integer(), {number(), number(), number()}}]) :: t()
+  def new(known),
+    do: %__MODULE__{known: Map.new(known, fn {id, {x, y, h}} -> {id, Pose.new(x, y, h)} end)}
+
+  @doc "The hypotheses moved by a step of odometry, in the robot's own frame."
+  @spec moved(t(), step :: Pose.t()) :: t()
+  def moved(%__MODULE__{hypotheses: nil} = printed, _step), do: printed
+
+  def moved(%__MODULE__{hypotheses: hypotheses} = printed, step),
+    do: %{printed | hypotheses: Hypotheses.moved(hypotheses, step)}
+
+  @doc "Without hypotheses and streaks: the odometry began again."
+  @spec forget(t()) :: t()
+  def forget(%__MODULE__{} = printed), do: %{printed | streaks: %{}, hypotheses: nil}
+
+  @doc """
+  The localiser after a picture, taken at the pose `back` relative to the present one. Its belief is corrected only if `corrects?`:
+  one that leads would have to move all that follow it.
+  """
+  @spec see(localiser, Percept.t(), back :: Pose.t(), corrects? :: boolean()) :: localiser
+        when localiser: map()
+  def see(%{printed: %{known: known}} = localiser, _percept, _back, _corrects?)
+      when known == %{},
+      do: localiser
+
+  def see(%{printed: printed} = localiser, percept, back, corrects?) do
+    %{marks: marks, at_ms: at_ms} = percept.detections
+    {read, streaks} = Streaks.note(printed.streaks, marks, at_ms)
+
+    for %{id: id, range: range} = mark <- read,
+        range != nil,
+        is_map_key(printed.known, id),
+        reduce: %{localiser | printed: %{printed | streaks: streaks}},
+        do: (localiser -> judge(localiser, {mark, printed.known[id]}, {percept, back, corrects?}))
+  end
+
+  defp judge(%{belief: belief} = localiser, {mark, at}, {_percept, back, corrects?} = picture) do
+    exposed = Pose.compose(belief.pose, back)
+
+    cond do
+      vague?(localiser) or Pose.distance(exposed, Pose.point(at)) < @near ->
+        suspect(localiser, {mark, at}, picture)
+
+      Enum.all?(measurements(belief, exposed, mark, at), &fits?(belief, &1)) ->
+        printed = localiser.printed
+        localiser = %{localiser | printed: %{printed | hypotheses: nil}}
+
+        if corrects?,
+          do: %{localiser | belief: corrected(belief, back, mark, at)},
+          else: localiser
+
+      true ->
+        suspect(localiser, {mark, at}, picture)
+    end
+  end
+
+  defp vague?(%{lost?: true}), do: true
+
+  defp vague?(%{belief: belief}) do
+    {worst, _least, heading} = Belief.sd(belief)
+    {most, turn} = @vague
+    worst > most or heading > turn
+  end
+
+  defp fits?(belief, {error, slope, noise, _exact}),
+    do: error * error <= @gate * (Belief.variance(belief, slope) + noise)
+
+  # One after the other, because the first ones move the belief.
+  defp corrected(belief, back, mark, at) do
+    count = length(measurements(belief, Pose.compose(belief.pose, back), mark, at))
+
+    Enum.reduce(0..(count - 1), belief, fn k, belief ->
+      exposed = Pose.compose(belief.pose, back)
+      {error, slope, noise, exact} = measurements(belief, exposed, mark, at) |> Enum.at(k)
+
+      if Belief.variance(belief, slope) > exact * exact,
+        do: Belief.measured(belief, error, slope, @repeated * noise),
+        else: belief
+    end)
+  end
+
+  # Innovation, derivatives by x, y and heading, variance of the noise, and how exact it can be, of bearing, range and yaw. What
+  # they are no linear functions of counts as noise (`Robot.Localiser.Sightings`).
+  defp measurements(belief, exposed, mark, at) do
+    {dx, dy} = {at.x - exposed.x, at.y - exposed.y}
+    square = max(dx * dx + dy * dy, @near * @near)
+    distance = :math.sqrt(square)
+    along = Belief.variance(belief, {dx / distance, dy / distance, 0.0})
+    across = Belief.variance(belief, {-dy / distance, dx / distance, 0.0})
+    place = @place_sd * @place_sd
+    bearing = Pose.wrap(mark.bearing - Pose.wrap(:math.atan2(dy, dx) - exposed.heading))
+    bend = 2 * along * across / (square * square)
+
+    [
+      {bearing, {dy / square, -dx / square, -1.0},
+       mark.bearing_sd * mark.bearing_sd + place / square + bend,
+       @exact_turn + @exact / distance},
+      {mark.range - distance, {-dx / distance, -dy / distance, 0.0},
+       mark.range_sd * mark.range_sd + place + 0.75 * across * across / square, @exact}
+    ] ++ yaw(exposed, mark, at)
+  end
+
+  defp yaw(_exposed, %{yaw: nil}, _at), do: []
+
+  defp yaw(exposed, %{yaw: yaw, yaw_sd: sd}, at) do
+    expected = at.heading + :math.pi() - exposed.heading
+
+    [
+      {Pose.wrap(yaw - Pose.wrap(expected)), {0.0, 0.0, -1.0}, sd * sd + @turn_sd * @turn_sd,
+       @exact_turn}
+    ]
+  end
+
+  # The mark is not where it should be seen from here, or nothing is known of where that is.
+  defp suspect(%{printed: printed} = localiser, {mark, at}, {percept, back, _corrects?}) do
+    hypotheses =
+      case printed.hypotheses do
+        nil -> Hypotheses.new(mark, at, back, percept)
+        known -> Hypotheses.weighed(known, mark, at, back, weigher(localiser, percept))
+      end
+
+    settle(%{localiser | printed: %{printed | hypotheses: hypotheses}}, vague?(localiser))
+  end
+
+  defp weigher(%{belief: belief}, percept),
+    do: fn poses -> MonteCarlo.likelihoods(percept, belief.pose, poses) end
+
+  defp settle(%{printed: %{hypotheses: nil}} = localiser, _vague?), do: localiser
+
+  defp settle(%{printed: printed} = localiser, vague?) do
+    case Hypotheses.place(printed.hypotheses) do
+      {pose, variance, marks} when vague? or marks > 1 ->
+        belief = PlanFilter.placed(localiser, {pose, variance})
+
+        Frame.renumber(%{
+          localiser
+          | belief: belief,
+            lost?: false,
+            walls: %Walls{},
+            monte_carlo: nil,
+            printed: %{printed | hypotheses: nil}
+        })
+
+      _undecided ->
+        localiser
+    end
+  end
+end
