@@ -9,11 +9,11 @@ defmodule Robot.Localiser.PrintedMarks do
 
   A mark may hang elsewhere than the robot was told. One that contradicts the belief by more than three standard deviations does
   not correct it. Poses from which it would look like this are kept instead (`Robot.Localiser.PrintedMarks.Hypotheses`), and go
-  with the wheels. A robot that is lost, or unsure of its place by a metre, takes the place of these as soon as they are one place.
+  with the wheels. A robot that is lost, or unsure of its heading by half a radian, takes the place of these as soon as they are one place.
   Any other needs a second mark that fits there, so that no single mark carries it off; a mark that fits the belief ends them.
   """
   alias Hal.Pose
-  alias Robot.Localiser.{Belief, Frame, MonteCarlo, PlanFilter, Walls}
+  alias Robot.Localiser.{Belief, Frame, MonteCarlo, PlanFilter, Sightings, Walls}
   alias Robot.Localiser.PrintedMarks.Hypotheses
   alias Robot.Percept
   alias Vision.Mark
@@ -28,8 +28,8 @@ defmodule Robot.Localiser.PrintedMarks do
   # Pictures that follow one another have errors in common, so that this many count as one.
   @repeated 3
   @gate 9.0
-  # Vaguer than this (metres, radians), a belief is no line beside which a measurement could be bent.
-  @vague {1.0, 0.5}
+  # Of a heading that is vaguer than this (radians) an arc is no line.
+  @vague 0.5
   @near 0.2
 
   defstruct known: %{}, streaks: %{}, hypotheses: nil
@@ -106,9 +106,8 @@ defmodule Robot.Localiser.PrintedMarks do
   defp vague?(%{lost?: true}), do: true
 
   defp vague?(%{belief: belief}) do
-    {worst, _least, heading} = Belief.sd(belief)
-    {most, turn} = @vague
-    worst > most or heading > turn
+    {_worst, _least, heading} = Belief.sd(belief)
+    heading > @vague
   end
 
   defp fits?(belief, {error, slope, noise, _exact}),
@@ -128,24 +127,21 @@ defmodule Robot.Localiser.PrintedMarks do
     end)
   end
 
-  # Innovation, derivatives by x, y and heading, variance of the noise, and how exact it can be, of bearing, range and yaw. What
-  # they are no linear functions of counts as noise (`Robot.Localiser.Sightings`).
+  # Innovation, derivatives by x, y and heading, variance of the noise, and how exact it can be: along the line of sight, across it
+  # and of the yaw. The robot stands at this distance from the mark, in a direction that it knows as well as its heading, so where
+  # the mark is, is a linear function of the position, however vague that is; of the heading it is an arc.
   defp measurements(belief, exposed, mark, at) do
     {dx, dy} = {at.x - exposed.x, at.y - exposed.y}
-    square = max(dx * dx + dy * dy, @near * @near)
-    distance = :math.sqrt(square)
-    along = Belief.variance(belief, {dx / distance, dy / distance, 0.0})
-    across = Belief.variance(belief, {-dy / distance, dx / distance, 0.0})
+    direction = exposed.heading + mark.bearing
+    {ux, uy} = {:math.cos(direction), :math.sin(direction)}
+    {along, across} = Sightings.arc(Belief.variance(belief, {0.0, 0.0, 1.0}), mark.range)
     place = @place_sd * @place_sd
-    bearing = Pose.wrap(mark.bearing - Pose.wrap(:math.atan2(dy, dx) - exposed.heading))
-    bend = 2 * along * across / (square * square)
+    aside = mark.range * mark.bearing_sd
 
     [
-      {bearing, {dy / square, -dx / square, -1.0},
-       mark.bearing_sd * mark.bearing_sd + place / square + bend,
-       @exact_turn + @exact / distance},
-      {mark.range - distance, {-dx / distance, -dy / distance, 0.0},
-       mark.range_sd * mark.range_sd + place + 0.75 * across * across / square, @exact}
+      {ux * dx + uy * dy - mark.range, {ux, uy, 0.0},
+       mark.range_sd * mark.range_sd + place + along, @exact},
+      {ux * dy - uy * dx, {-uy, ux, mark.range}, aside * aside + place + across, @exact}
     ] ++ yaw(exposed, mark, at)
   end
 

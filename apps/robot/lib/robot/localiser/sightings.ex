@@ -155,9 +155,12 @@ defmodule Robot.Localiser.Sightings do
     Belief.correct(belief, mark.key, error, {{-uy, ux, seen}, {0.0, 0.0}}, noise)
   end
 
-  # The mean squares, along and across, by which a vector of this length that is turned by a normal angle of this variance is
-  # off the tangent: E (1 - cos a)^2 and E (sin a - a)^2, with E cos a = exp(-v / 2) and E a sin a = v exp(-v / 2).
-  defp arc(variance, length) do
+  @doc """
+  The mean squares, along and across, by which a vector of this length (metres) that is turned by a normal angle of this variance
+  (rad2) is off the tangent: E (1 - cos a)^2 and E (sin a - a)^2, with E cos a = exp(-v / 2) and E a sin a = v exp(-v / 2).
+  """
+  @spec arc(variance :: float(), length :: float()) :: {along :: float(), across :: float()}
+  def arc(variance, length) do
     square = length * length
     mean = :math.exp(-variance / 2)
     fourth = :math.pow(mean, 4)
