@@ -10,7 +10,8 @@ defmodule Robot.Config do
       origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
     * `:marks` - the printed marks that the camera looks for, options of `Vision.Marks`, or `nil` (the default) for none; and
-      `known: [{7, {x, y, heading}}]`, where those with these ids hang and face, in the `map` frame (metres, radians)
+      `known: [{7, {x, y, heading}}]`, where those with these ids hang and face, in the `map` frame (metres, radians), and
+      `robots: [{11, :mag2}]`, which robots bear them on their backs
     * `:save_pictures` - where and how the camera's pictures are saved, options of `Vision.Saver`,
       or `nil` (the default)
     * `:limits` - values that replace those of the profile and may not exceed them, such as
@@ -195,7 +196,11 @@ defmodule Robot.Config do
   def marks do
     place = {:tuple, List.duplicate({:number, -1.0e6, 1.0e6}, 3), "{x, y, heading}"}
     known = {:list, {:tuple, [{:integer, 0, 65_535}, place], "{id, {x, y, heading}}"}}
-    {:keys, Vision.Marks.table() ++ [known: known]}
+
+    bears =
+      {:tuple, [{:integer, 0, 65_535}, {:check, &id?/1, "a robot such as :mag2,"}], "{id, robot}"}
+
+    {:keys, Vision.Marks.table() ++ [known: known, robots: {:list, bears}]}
   end
 
   @doc "The option type of `presence`."

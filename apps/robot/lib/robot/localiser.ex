@@ -291,12 +291,15 @@ defmodule Robot.Localiser do
 
       back ->
         localiser = check(localiser, percept, back)
-        belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
-        localiser = %{localiser | seen_ms: at_ms, belief: belief}
+        {read, printed} = PrintedMarks.read(localiser.printed, percept)
+        named = PrintedMarks.named(printed, read)
+        anchors = localiser.anchors.marks
+        belief = Sightings.correct(localiser.belief, anchors, percept, back, named)
+        localiser = %{localiser | seen_ms: at_ms, belief: belief, printed: printed}
 
         # Their places are in the frame of the plan.
         if on_plan?(localiser),
-          do: PrintedMarks.see(localiser, percept, back, by_walls?(localiser)),
+          do: PrintedMarks.see(localiser, read, percept, back, by_walls?(localiser)),
           else: localiser
     end
   end

@@ -236,7 +236,7 @@ defmodule Sim.World do
       Elixir.Map.merge(taken, %{at_ms: world.at_ms, width: sight.width, height: sight.height})
 
     noise = if world.noise != :off, do: {world.seed, body.index, world.step}
-    World.MarkReadings.see(world.map, sight, poles(world, id), world.marks, frame, noise)
+    World.MarkReadings.see(world.map, sight, poles(world, id), marks(world, id), frame, noise)
   end
 
   @doc "The picture of a robot's camera, in its current direction."
@@ -245,12 +245,13 @@ defmodule Sim.World do
     body = Elixir.Map.fetch!(world.robots, id)
     sight = CameraFrustum.of(body)
     noise = if world.noise != :off, do: {world.seed, world.step, body.index}
+    packed = for mark <- marks(world, id), do: mark.packed
 
     %Hal.Frame{
       format: :i420,
       width: sight.width,
       height: sight.height,
-      bytes: Compute.paint(world.map, sight, others(world, body, scenery), marks(world), noise),
+      bytes: Compute.paint(world.map, sight, others(world, body, scenery), packed, noise),
       at_ms: world.at_ms,
       pan: body.pan,
       tilt: body.tilt,
@@ -270,7 +271,15 @@ defmodule Sim.World do
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
-  defp marks(world), do: for(mark <- world.marks, do: mark.packed)
+  # As they hang now; a robot does not see its own.
+  defp marks(world, id) do
+    where = fn robot ->
+      %{pose: pose, profile: profile} = Elixir.Map.fetch!(world.robots, robot)
+      {pose, profile.radius}
+    end
+
+    for mark <- world.marks, mark.robot != id, do: World.Mark.borne(mark, where)
+  end
 
   # Everything upright that robot `id` can see.
   defp poles(%__MODULE__{} = world, id) do

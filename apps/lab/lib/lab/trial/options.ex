@@ -100,8 +100,12 @@ defmodule Lab.Trial.Options do
     Vision.Marks.table()
     |> Keyword.merge(
       height: {:number, 0.0, 100.0, "m"},
-      at: [list, required: true],
-      known: {:or, :all, list}
+      at: [list, default: []],
+      known: {:or, :all, list},
+      robots:
+        {:list,
+         {:tuple, [{:integer, 0, 65_535}, {:check, &robot?/1, "a robot of this run"}],
+          "{id, robot}"}}
     )
   end
 

@@ -116,21 +116,27 @@ defmodule Lab.Trial.Setup do
 
   def looked_for(%{marks: marks}) do
     known = Keyword.get(marks, :known, [])
-    known = if known == :all, do: marks[:at], else: known
+    known = if known == :all, do: hanging(marks), else: known
     known = for {id, {x, y, degrees}} <- known, do: {id, {x, y, degrees * :math.pi() / 180}}
-    Keyword.take(marks, [:family, :size]) ++ [known: known]
+    Keyword.take(marks, [:family, :size, :robots]) ++ [known: known]
   end
+
+  defp hanging(marks), do: Keyword.get(marks, :at, [])
 
   defp check_marks(%{marks: nil}), do: :ok
 
-  defp check_marks(%{marks: given}) do
+  defp check_marks(%{marks: given, robots: robots}) do
     with :ok <- Marks.available(),
          {:ok, %{family: family}} <- Marks.new(Keyword.take(given, [:family, :size])) do
-      unknown = fn {id, _at} -> Marks.Native.picture(family, id) == nil end
+      borne = Keyword.get(given, :robots, [])
+      ids = Enum.map(hanging(given) ++ borne, &elem(&1, 0))
+      unknown = Enum.find(ids, &(Marks.Native.picture(family, &1) == nil))
+      stranger = Enum.find(Enum.map(borne, &elem(&1, 1)), &(&1 not in robots))
 
-      case Enum.find(given[:at], unknown) do
-        nil -> :ok
-        {id, _at} -> {:error, "#{family} has no mark #{id}"}
+      cond do
+        unknown -> {:error, "#{family} has no mark #{unknown}"}
+        stranger -> {:error, "marks.robots: #{inspect(stranger)} is no robot of this run"}
+        true -> :ok
       end
     end
   end
@@ -138,10 +144,14 @@ defmodule Lab.Trial.Setup do
   defp hung(nil), do: []
 
   defp hung(marks) do
-    for {id, {x, y, degrees}} <- marks[:at] do
-      pose = Pose.new(x, y, degrees * :math.pi() / 180)
-      [id: id, pose: pose] ++ Keyword.take(marks, [:family, :size, :height])
-    end
+    alike = Keyword.take(marks, [:family, :size, :height])
+
+    hang =
+      for {id, {x, y, degrees}} <- hanging(marks),
+          do: [id: id, pose: Pose.new(x, y, degrees * :math.pi() / 180)] ++ alike
+
+    hang ++
+      for({id, robot} <- Keyword.get(marks, :robots, []), do: [id: id, robot: robot] ++ alike)
   end
 
   # Places that a script names, which depend on the map.

@@ -65,6 +65,34 @@ defmodule Lab.Trial.MarksTest do
   end
 
   @tag skip: @why_not
+  test "a mark on a robot's back is read from behind, in pictures and without painting" do
+    marks = [size: 0.2, robots: [{11, :mag1}, {12, :mag2}], height: 0.3]
+
+    for blobs <- [:direct, :painted] do
+      {:ok, setup} = Trial.setup(%{@options | marks: marks} |> Map.put(:blobs, blobs))
+      [one, two] = setup.world.order
+      # The second one stands a metre behind the first, and looks at it.
+      %{pose: pose} = setup.world.robots[one]
+
+      ahead = fn heading ->
+        back = Hal.Pose.compose(pose, Hal.Pose.new(-1.2, 0.0, 0.0))
+        world = Sim.World.displace(setup.world, two, back)
+        %{setup | world: Sim.World.displace(world, one, %{pose | heading: heading})}
+      end
+
+      read = fn setup ->
+        trial = Trial.begin(setup)
+        {detections, _trial} = Lab.Trial.Mechanics.look(trial, two)
+        for mark <- detections.marks, do: {mark.id, Float.round(mark.range, 1)}
+      end
+
+      assert [{11, range}] = read.(ahead.(pose.heading))
+      assert_in_delta range, 1.2 - setup.world.robots[one].profile.radius, 0.11
+      assert read.(ahead.(pose.heading + :math.pi())) == []
+    end
+  end
+
+  @tag skip: @why_not
   test "robots correct their poses by marks that they know, and not for ever by one that hangs elsewhere" do
     at = [{1, {3.0, 0.0, 180}}, {2, {-3.0, 0.0, 0}}, {3, {0.0, 3.0, -90}}, {4, {0.0, -3.0, 90}}]
     told = List.keyreplace(at, 3, 0, {3, {0.0, 5.0, -90}})
@@ -103,6 +131,13 @@ defmodule Lab.Trial.MarksTest do
 
     assert {:error, line} = error.(%{marks: [size: 1, at: [{:three, {0, 0, 0}}]]})
     assert line =~ "marks.at"
+
+    unless @why_not,
+      do:
+        assert(
+          error.(%{marks: [size: 1, robots: [{3, :mag9}]]}) ==
+            {:error, "marks.robots: :mag9 is no robot of this run"}
+        )
 
     if @why_not,
       do: assert({:error, @why_not} == error.(%{})),

@@ -61,7 +61,7 @@ defmodule Robot.Control.Controller do
   frame at which the odometry reads zero, with which the controller estimates the percept's pose by
   `Robot.Localiser`, and `departed`, see there; `plan`, the walls of a floor plan
   (`Nav.Grid`) in the map frame, or an empty `Nav.OccupancyGrid` for those that its sonars will
-  have seen; without either it knows none; `marks`, the places of printed marks (`Robot.Config`); `seed`, that of the random numbers with which it looks for its place on the plan.
+  have seen; without either it knows none; `marks`, what it knows of printed marks (`Robot.Config`); `seed`, that of the random numbers with which it looks for its place on the plan.
   """
   @spec new(keyword()) :: t()
   def new(options) do

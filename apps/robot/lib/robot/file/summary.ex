@@ -262,7 +262,7 @@ defmodule Robot.File.Summary do
 
   defp marks(given) do
     {known, given} = Keyword.pop(given, :known, [])
-    {:ok, marks} = Vision.Marks.new(given)
+    {:ok, marks} = Vision.Marks.new(Keyword.delete(given, :robots))
     places = if known != [], do: "; it knows where #{length(known)} hang"
     "#{marks.family}, #{metres(marks.size)} between their corners#{places}"
   end

@@ -32,24 +32,28 @@ defmodule Robot.Localiser.PrintedMarks do
   @vague 0.5
   @near 0.2
 
-  defstruct known: %{}, streaks: %{}, hypotheses: nil
+  defstruct known: %{}, robots: %{}, streaks: %{}, hypotheses: nil
 
   @typedoc "Where the marks hang and face, which were read of late, and where the robot may be by those that contradict its belief."
   @type t :: %__MODULE__{
           known: %{Mark.id() => Pose.t()},
+          robots: %{Mark.id() => atom()},
           streaks: Streaks.t(),
           hypotheses: Hypotheses.t() | nil
         }
 
   @doc """
-  What a robot is told of marks: `[{id, {x, y, heading}}]` (metres, radians).
+  What a robot is told of marks: `known: [{id, {x, y, heading}}]`, where they hang (metres, radians), and `robots: [{id, name}]`, which
+  robots bear them.
 
-      iex> Robot.Localiser.PrintedMarks.new([{7, {1.0, 2.0, 0.5}}]).known
+      iex> Robot.Localiser.PrintedMarks.new(known: [{7, {1.0, 2.0, 0.5}}], size: 0.2).known
       %{7 => Hal.Pose.new(1.0, 2.0, 0.5)}
   """
-  @spec new([{non_neg_integer(), {number(), number(), number()}}]) :: t()
-  def new(known),
-    do: %__MODULE__{known: Map.new(known, fn {id, {x, y, h}} -> {id, Pose.new(x, y, h)} end)}
+  @spec new(keyword()) :: t()
+  def new(marks) do
+    known = for {id, {x, y, heading}} <- marks[:known] || [], do: {id, Pose.new(x, y, heading)}
+    %__MODULE__{known: Map.new(known), robots: Map.new(marks[:robots] || [])}
+  end
 
   @doc "The hypotheses moved by a step of odometry, in the robot's own frame."
   @spec moved(t(), step :: Pose.t()) :: t()
@@ -62,25 +66,33 @@ defmodule Robot.Localiser.PrintedMarks do
   @spec forget(t()) :: t()
   def forget(%__MODULE__{} = printed), do: %{printed | streaks: %{}, hypotheses: nil}
 
-  @doc """
-  The localiser after a picture, taken at the pose `back` relative to the present one. Its belief is corrected only if `corrects?`:
-  one that leads would have to move all that follow it.
-  """
-  @spec see(localiser, Percept.t(), back :: Pose.t(), corrects? :: boolean()) :: localiser
-        when localiser: map()
-  def see(%{printed: %{known: known}} = localiser, _percept, _back, _corrects?)
-      when known == %{},
-      do: localiser
+  @doc "The marks that count of a picture, read in it and in the two before, with a range."
+  @spec read(t(), Percept.t()) :: {[Mark.t()], t()}
+  def read(%__MODULE__{known: known, robots: robots} = printed, _percept)
+      when known == %{} and robots == %{},
+      do: {[], printed}
 
-  def see(%{printed: printed} = localiser, percept, back, corrects?) do
-    %{marks: marks, at_ms: at_ms} = percept.detections
+  def read(%__MODULE__{} = printed, %Percept{detections: %{marks: marks, at_ms: at_ms}}) do
     {read, streaks} = Streaks.note(printed.streaks, marks, at_ms)
+    {for(%{range: range} = mark <- read, range != nil, do: mark), %{printed | streaks: streaks}}
+  end
 
-    for %{id: id, range: range} = mark <- read,
-        range != nil,
-        is_map_key(printed.known, id),
-        reduce: %{localiser | printed: %{printed | streaks: streaks}},
-        do: (localiser -> judge(localiser, {mark, printed.known[id]}, {percept, back, corrects?}))
+  @doc "Those of the marks that robots bear, by the names of these."
+  @spec named(t(), [Mark.t()]) :: %{atom() => Mark.t()}
+  def named(%__MODULE__{robots: robots}, read),
+    do: for(mark <- read, id = robots[mark.id], into: %{}, do: {id, mark})
+
+  @doc """
+  The localiser after the marks of a picture that was taken at the pose `back` relative to the present one. Its belief is corrected
+  only if `corrects?`: one that leads would have to move all that follow it.
+  """
+  @spec see(localiser, [Mark.t()], Percept.t(), back :: Pose.t(), corrects? :: boolean()) ::
+          localiser
+        when localiser: map()
+  def see(%{printed: %{known: known}} = localiser, read, percept, back, corrects?) do
+    for mark <- read, is_map_key(known, mark.id), reduce: localiser do
+      localiser -> judge(localiser, {mark, known[mark.id]}, {percept, back, corrects?})
+    end
   end
 
   defp judge(%{belief: belief} = localiser, {mark, at}, {_percept, back, corrects?} = picture) do

@@ -10,7 +10,7 @@ defmodule Robot.Localiser.PrintedMarksTest do
 
   # A localiser that believes to be at the origin, and is told of these marks.
   defp localiser(known \\ @known) do
-    localiser = %{Localiser.new(Pose.new(0, 0)) | printed: PrintedMarks.new(known)}
+    localiser = %{Localiser.new(Pose.new(0, 0)) | printed: PrintedMarks.new(known: known)}
     {_percept, localiser} = Localiser.update(localiser, percept(0, Pose.new(0, 0), []))
     localiser
   end
