@@ -82,7 +82,8 @@
   colours: "landmark.txt",
 
   # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none. The size is the
-  # side of the square between the corners, in metres.
+  # side of the square between the corners, in metres. known: [{7, {2.0, 1.5, deg(90)}}] says where some hang and face that the
+  # map does not name, robots: [{11, :mag2}] which robots bear them on their backs.
   marks: nil,
 
   # Keeps pictures of the camera as JPEG, so many a second, the newest of them, in a folder that is there:
@@ -160,6 +161,7 @@
   policies: [
     # mission: :landmark,                  # nil: none until it is told one; or {:patrol, period: 90}
     # formation: {:column, 1.0},           # :column :line :wedge :triangle :diamond :circle; 0.8 to 5 m
+    # formations: [{3, :line}],            # that which a mark with this number asks the leader for
     # assign: :chain,                      # or :cost
     # leader_change: true,
     # colour: "YellowLandmark",

@@ -161,6 +161,7 @@ defmodule Docs.Checks do
     # Files.
     "map: \"building.yaml\",",
     "image: building.png ",
+    "marks:                    # in building.yaml",
     "#!/bin/sh",
     "defmodule Lab.FleetFeed do",
     "defmodule LabWeb.FleetLive do",

@@ -104,7 +104,7 @@ defmodule Lab.Trial do
   defp marks(%{marks: nil}), do: nil
 
   defp marks(options) do
-    {:ok, marks} = Vision.Marks.new(Setup.looked_for(options))
+    {:ok, marks} = Vision.Marks.new(Keyword.take(options.marks, [:family, :size]))
     marks
   end
 

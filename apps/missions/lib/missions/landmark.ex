@@ -16,6 +16,7 @@ defmodule Missions.Landmark do
   | `Follower` | what a follower does: its slot, its child; `.Gaze` where it looks; `.Guide` tells one without pictures where it stands |
   | `Marks` | what it finds its pose by, and whether it is sure of its place |
   | `Blocker` | what keeps it from its slot |
+  | `Signs` | which formation the mark that it sees asks for |
   | `Merge` | what becomes of two leaders that meet |
   | `EpochFilter` | which robot is left out, because it claims an epoch that none can have reached |
   | `ReferenceInbox` | whose anchor it believes, and when it joins a leader that names it |
@@ -29,7 +30,7 @@ defmodule Missions.Landmark do
   alias Swarm.Formation.Trail
   alias Missions.Landmark
   alias Missions.Landmark.{EpochFilter, Follower, LandmarkTrack, Leader, Lookout, Policy}
-  alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Transitions}
+  alias Missions.Landmark.{ReferenceInbox, Rounds, SelfReport, Signs, Transitions}
   alias Missions.Landmark.Leader.Loss
   alias Missions.Landmark.Transitions.{Conditions, Entry}
 
@@ -46,6 +47,7 @@ defmodule Missions.Landmark do
       me: robot,
       formation: Keyword.get(options, :formation, {:column, 1.0}),
       assign: Keyword.get(options, :assign, :chain),
+      signs: Signs.new(Keyword.get(options, :formations, [])),
       leader_change?: Keyword.get(options, :leader_change, true),
       colour: Keyword.get(options, :colour, Landmark.State.colour()),
       round: Round.new(robot),
@@ -101,7 +103,7 @@ defmodule Missions.Landmark do
   def handle({:command, {:formation, kind, spacing}}, mission) do
     case Formation.new(kind, spacing: spacing) do
       {:ok, formation} ->
-        still(Leader.reshape(%{mission | formation: formation, asked_no: mission.asked_no + 1}))
+        still(Leader.reshape(mission, formation))
 
       {:error, _line} ->
         still(mission)
@@ -148,6 +150,7 @@ defmodule Missions.Landmark do
 
     {mission, letters} = Rounds.tick(mission)
     {mission, stages} = step(mission)
+    {mission, signs} = Signs.read(mission)
     {mission, effects} = mission.phase |> Transitions.activity() |> act(mission)
 
     effects =
@@ -156,7 +159,7 @@ defmodule Missions.Landmark do
         else: effects ++ [anchors: unled(mission)]
 
     {mission, refused} = EpochFilter.tell(mission)
-    effects = letters ++ stages ++ refused ++ effects
+    effects = letters ++ stages ++ signs ++ refused ++ effects
     {mission.phase, mission, effects ++ [{:claim, SelfReport.claim(mission)}]}
   end
 

@@ -76,7 +76,7 @@ defmodule Swarm.MemberSpecTest do
 
     assert lines(text) == [
              "mag1.exs:2: policies.formation: expected :column, :line, :wedge, :triangle, :diamond or :circle, got :colum; did you mean :column?",
-             "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
+             "mag1.exs:3: policies.leader_chagne: is not known: allowed are mission, formation, formations, assign, leader_change, colour, policy, of, lost_link; did you mean leader_change?",
              "mag1.exs:3: policies.of: expected a whole number from 1 to 1000 robots of the fleet, got 0",
              "mag1.exs:4: network.zzz: is not known: allowed are fleet, secret_file, interface, port, multicast, peers, addresses, dist_port, allow, full_mesh, degree",
              "mag1.exs:4: network.port: expected a whole number from 0 to 65535, got -1",

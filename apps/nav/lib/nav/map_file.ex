@@ -20,9 +20,14 @@ defmodule Nav.MapFile do
   @most_grid 1_000_000
 
   @enforce_keys [:file, :grid]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [marks: []]
 
-  @type t :: %__MODULE__{file: Path.t(), grid: Grid.t()}
+  @typedoc "`marks` are the printed marks that hang there: id, and place and heading in the map (metres, radians)."
+  @type t :: %__MODULE__{
+          file: Path.t(),
+          grid: Grid.t(),
+          marks: [{non_neg_integer(), {float(), float(), float()}}]
+        }
 
   @doc """
   The map that a description in YAML describes; the error is one line.
@@ -38,7 +43,7 @@ defmodule Nav.MapFile do
          size = {width * description.resolution, height * description.resolution},
          :ok <- size(file, Picture.cells(size)),
          {:ok, grid} <- grid(file, Picture.walls(picture, description.shades, size), description),
-         do: {:ok, %__MODULE__{file: file, grid: grid}}
+         do: {:ok, %__MODULE__{file: file, grid: grid, marks: description.marks}}
   end
 
   @doc """

@@ -9,7 +9,9 @@ defmodule Robot.Config do
     * `:start` - its pose when it is switched on, in the `map` frame; `%Hal.Pose{}`, default the
       origin
     * `:colours` - what the camera looks for, `%Vision.Colours{}`; needed with a camera
-    * `:marks` - the printed marks that the camera looks for, options of `Vision.Marks`, or `nil` (the default) for none
+    * `:marks` - the printed marks that the camera looks for, options of `Vision.Marks`, or `nil` (the default) for none; and
+      `known: [{7, {x, y, heading}}]`, where those with these ids hang and face, in the `map` frame (metres, radians), and
+      `robots: [{11, :mag2}]`, which robots bear them on their backs
     * `:save_pictures` - where and how the camera's pictures are saved, options of `Vision.Saver`,
       or `nil` (the default)
     * `:limits` - values that replace those of the profile and may not exceed them, such as
@@ -167,7 +169,7 @@ defmodule Robot.Config do
       scan: [:driver, default: nil],
       start: {:struct, Pose},
       colours: [{:struct, Vision.Colours}, default: nil],
-      marks: [{:keys, Vision.Marks.table()}, default: nil],
+      marks: [marks(), default: nil],
       save_pictures: [{:keys, Vision.Saver.Options.table()}, default: nil],
       limits: {:keys, @limits},
       mission: [:driver, default: nil],
@@ -187,6 +189,18 @@ defmodule Robot.Config do
       departure_file: [{:path, "the path of a file"}, default: nil],
       trace: [:mfa, default: nil]
     ]
+  end
+
+  @doc "The option type of `marks`."
+  @spec marks() :: Options.Type.t()
+  def marks do
+    place = {:tuple, List.duplicate({:number, -1.0e6, 1.0e6}, 3), "{x, y, heading}"}
+    known = {:list, {:tuple, [{:integer, 0, 65_535}, place], "{id, {x, y, heading}}"}}
+
+    bears =
+      {:tuple, [{:integer, 0, 65_535}, {:check, &id?/1, "a robot such as :mag2,"}], "{id, robot}"}
+
+    {:keys, Vision.Marks.table() ++ [known: known, robots: {:list, bears}]}
   end
 
   @doc "The option type of `presence`."

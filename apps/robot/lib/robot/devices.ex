@@ -105,7 +105,7 @@ defmodule Robot.Devices do
 
   # The options have been checked.
   defp marks(%Robot.Config{marks: options}) do
-    {:ok, marks} = Vision.Marks.new(options)
+    {:ok, marks} = Vision.Marks.new(Keyword.drop(options, [:known, :robots]))
     marks
   end
 

@@ -166,11 +166,21 @@ defmodule Robot.File do
   @spec config(t()) :: {:ok, Robot.Config.t()} | {:error, String.t()}
   def config(%__MODULE__{} = robot) do
     options = robot |> Map.take(@config) |> Map.put(:plan, robot.map && robot.map.grid)
+    options = %{options | marks: known(robot)}
 
     with {:ok, config} <- options |> Map.to_list() |> Robot.Config.new(),
          {:ok, drive} <- Device.fit(robot.drive, config.profile),
          do: {:ok, %{config | drive: drive}}
   end
+
+  # What the robot's own file says of a mark counts before what the map says.
+  defp known(%{marks: [_ | _] = marks, map: %MapFile{marks: on_map}}) do
+    own = Keyword.get(marks, :known, [])
+    others = Enum.reject(on_map, fn {id, _place} -> List.keymember?(own, id, 0) end)
+    Keyword.put(marks, :known, own ++ others)
+  end
+
+  defp known(%{marks: marks}), do: marks
 
   defp whole({:keys, _keys}), do: :ok
   defp whole({:list, []}), do: :ok

@@ -22,6 +22,7 @@ defmodule Robot.Localiser do
     History,
     MonteCarlo,
     PlanFilter,
+    PrintedMarks,
     RingCheck,
     Sightings,
     TurnCheck,
@@ -61,6 +62,7 @@ defmodule Robot.Localiser do
                 ring_check: nil,
                 plan?: false,
                 walls: %Walls{},
+                printed: %PrintedMarks{},
                 seed: 0,
                 monte_carlo: nil
               ]
@@ -90,6 +92,7 @@ defmodule Robot.Localiser do
           ring_check: RingCheck.t() | nil,
           plan?: boolean(),
           walls: Walls.t(),
+          printed: PrintedMarks.t(),
           seed: integer(),
           monte_carlo: MonteCarlo.t() | nil
         }
@@ -246,6 +249,7 @@ defmodule Robot.Localiser do
         plan?: false,
         walls: %Walls{},
         monte_carlo: nil,
+        printed: PrintedMarks.forget(localiser.printed),
         belief: Belief.doubt(localiser.belief)
     }
 
@@ -271,7 +275,9 @@ defmodule Robot.Localiser do
 
   defp move(localiser, odometry) do
     step = Pose.relative(localiser.odometry, odometry)
-    %{localiser | odometry: odometry, belief: Belief.move(localiser.belief, step)}
+    belief = Belief.move(localiser.belief, step)
+    printed = PrintedMarks.moved(localiser.printed, step)
+    %{localiser | odometry: odometry, belief: belief, printed: printed}
   end
 
   # Every picture counts once. It was taken a moment ago, and the body may have turned since then.
@@ -285,8 +291,16 @@ defmodule Robot.Localiser do
 
       back ->
         localiser = check(localiser, percept, back)
-        belief = Sightings.correct(localiser.belief, localiser.anchors.marks, percept, back)
-        %{localiser | seen_ms: at_ms, belief: belief}
+        {read, printed} = PrintedMarks.read(localiser.printed, percept)
+        named = PrintedMarks.named(printed, read)
+        anchors = localiser.anchors.marks
+        belief = Sightings.correct(localiser.belief, anchors, percept, back, named)
+        localiser = %{localiser | seen_ms: at_ms, belief: belief, printed: printed}
+
+        # Their places are in the frame of the plan.
+        if on_plan?(localiser),
+          do: PrintedMarks.see(localiser, read, percept, back, by_walls?(localiser)),
+          else: localiser
     end
   end
 
@@ -304,8 +318,11 @@ defmodule Robot.Localiser do
   and in that of a leader that knows where it is in there.
   """
   @spec by_walls?(t()) :: boolean()
-  def by_walls?(%__MODULE__{frame: frame, anchors: anchors, plan?: plan?}),
-    do: anchors.walls? and planned?(frame, if(plan?, do: @nearly, else: @aligned))
+  def by_walls?(%__MODULE__{anchors: anchors} = localiser),
+    do: anchors.walls? and on_plan?(localiser)
+
+  defp on_plan?(%{frame: frame, plan?: plan?}),
+    do: planned?(frame, if(plan?, do: @nearly, else: @aligned))
 
   # The walls that one faces which was carried away are others.
   defp hear(localiser, percept) do

@@ -71,7 +71,7 @@ defmodule Sim.World do
   A world. `:robots` are `%{id:, profile:, pose:}` with the true pose, and `odometry:`, the first
   reading of the wheels (0, 0, 0 unless given), `infrared: true` for a robot with such sensors,
   `wheels:` for errors of its odometry (`Sim.World.Body`). `:marks` are printed marks, by the options of
-  `Sim.World.Mark.new!/1`; cameras see them in painted pictures. `:objects` are balls and boxes. Wrong options raise `ArgumentError`.
+  `Sim.World.Mark.new!/1`; cameras see them. `:objects` are balls and boxes. Wrong options raise `ArgumentError`.
   """
   @spec new!(keyword()) :: t()
   def new!(options) do
@@ -214,7 +214,7 @@ defmodule Sim.World do
     things <> before <> behind
   end
 
-  @doc "The same with the camera's current direction, as a detector would return it."
+  @doc "The same with the camera's current direction, as a detector would return it, and the marks that it would read; `nil` in a world without."
   @spec detections(t(), id(), scenery() | nil) :: Vision.Detections.t()
   def detections(%__MODULE__{} = world, id, scenery \\ nil) do
     %Body{pan: pan, tilt: tilt, field_of_view: angle} = Elixir.Map.fetch!(world.robots, id)
@@ -222,10 +222,25 @@ defmodule Sim.World do
     %Vision.Detections{
       at_ms: world.at_ms,
       blobs: blobs(world, id, scenery),
+      marks: read(world, id),
       pan: pan,
       tilt: tilt,
       field_of_view: angle
     }
+  end
+
+  defp read(%{marks: []}, _id), do: nil
+
+  defp read(world, id) do
+    body = Elixir.Map.fetch!(world.robots, id)
+    sight = CameraFrustum.of(body)
+    taken = Elixir.Map.take(body, [:pan, :tilt, :field_of_view])
+
+    frame =
+      Elixir.Map.merge(taken, %{at_ms: world.at_ms, width: sight.width, height: sight.height})
+
+    noise = if world.noise != :off, do: {world.seed, body.index, world.step}
+    World.MarkReadings.see(world.map, sight, poles(world, id), marks(world, id), frame, noise)
   end
 
   @doc "The picture of a robot's camera, in its current direction."
@@ -234,12 +249,13 @@ defmodule Sim.World do
     body = Elixir.Map.fetch!(world.robots, id)
     sight = CameraFrustum.of(body)
     noise = if world.noise != :off, do: {world.seed, world.step, body.index}
+    packed = for mark <- marks(world, id), do: mark.packed
 
     %Hal.Frame{
       format: :i420,
       width: sight.width,
       height: sight.height,
-      bytes: Compute.paint(world.map, sight, others(world, body, scenery), marks(world), noise),
+      bytes: Compute.paint(world.map, sight, others(world, body, scenery), packed, noise),
       at_ms: world.at_ms,
       pan: body.pan,
       tilt: body.tilt,
@@ -259,7 +275,15 @@ defmodule Sim.World do
   @spec alive?(t(), id()) :: boolean()
   def alive?(%__MODULE__{} = world, id), do: Elixir.Map.fetch!(world.robots, id).alive
 
-  defp marks(world), do: for(mark <- world.marks, do: mark.packed)
+  # As they hang now; a robot does not see its own.
+  defp marks(world, id) do
+    where = fn robot ->
+      %{pose: pose, profile: profile} = Elixir.Map.fetch!(world.robots, robot)
+      {pose, profile.radius}
+    end
+
+    for mark <- world.marks, mark.robot != id, do: World.Mark.borne(mark, where)
+  end
 
   # Everything upright that robot `id` can see.
   defp poles(%__MODULE__{} = world, id) do

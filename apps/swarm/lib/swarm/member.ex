@@ -45,7 +45,7 @@ defmodule Swarm.Member do
   @doc """
   A member. Options: `id`, `profile`, `start` (`Hal.Pose`, where the odometry reads zero),
   `mission` (`{module, options}`), `boot` (a number that grows with every start, default 1), `colours` (what its camera looks
-  for, `Vision.Colours`; `nil` for a robot without), `plan` (the walls of a floor
+  for, `Vision.Colours`; `nil` for a robot without), `marks` (`Robot.Config`), `plan` (the walls of a floor
   plan, `Nav.Grid`, or a `Nav.OccupancyGrid` for those that its sonars will have seen), `seed` (`Robot.Config`), `order` (a
   seed from which the order is drawn in which roles hear each other; `nil`: as they tell it).
   """
@@ -54,14 +54,15 @@ defmodule Swarm.Member do
     options =
       Keyword.validate!(
         options,
-        [:id, :profile, :start, :mission, boot: 1, colours: nil, plan: nil, seed: 0, order: nil]
+        [:id, :profile, :start, :mission, boot: 1, colours: nil, marks: nil, plan: nil, seed: 0] ++
+          [order: nil]
       )
 
     {module, mission_options} = options[:mission]
 
     # In lockstep nothing is a device: the trial carries out what it is told. The wheels are armed.
-    given =
-      Keyword.take(options, [:id, :profile, :start, :plan, :seed, :mission, :boot, :colours])
+    own = [:id, :profile, :start, :plan, :seed, :mission, :boot, :colours, :marks]
+    given = Keyword.take(options, own)
 
     camera = options[:colours] && {__MODULE__, []}
     scan = options[:profile].scan && {__MODULE__, []}

@@ -19,11 +19,12 @@ defmodule Vision.Mark do
   defstruct @enforce_keys ++
               [range: nil, bearing: nil, yaw: nil, range_sd: nil, bearing_sd: nil, yaw_sd: nil]
 
+  @type id :: non_neg_integer()
   @type family :: :tag36h11 | :tagStandard41h12
   @type point :: {x :: float(), y :: float()}
   @type t :: %__MODULE__{
           family: family(),
-          id: non_neg_integer(),
+          id: id(),
           at_ms: integer(),
           x: float(),
           y: float(),

@@ -76,7 +76,12 @@ defmodule Vision.Marks do
   def look(%__MODULE__{} = marks, detector, %Schedule{} = schedule, %Frame{} = frame) do
     with {part, boxes} <- Schedule.plan(schedule, frame.at_ms, {frame.width, frame.height}),
          {:ok, found} <- search(boxes, detector, frame, []) do
-      seen = for one <- Enum.sort(found), clear?(one, frame), do: mark(one, marks, frame)
+      seen =
+        for {id, _wrong_bits, margin, {x, y}, corners} <- Enum.sort(found),
+            margin >= @least_margin,
+            {:ok, mark} <- [reading(marks, id, corners, frame)],
+            do: %{mark | x: x, y: y}
+
       {:ok, seen, Schedule.note(schedule, part, frame.at_ms, seen)}
     else
       :rest -> {:ok, schedule.marks, schedule}
@@ -97,32 +102,48 @@ defmodule Vision.Marks do
          do: search(boxes, detector, frame, more ++ found)
   end
 
-  defp clear?({_id, _wrong_bits, margin, _centre, corners}, %Frame{width: width, height: height}) do
-    margin >= @least_margin and
-      Enum.all?(corners, fn {x, y} ->
-        x >= @edge_px and y >= @edge_px and x <= width - 1 - @edge_px and
-          y <= height - 1 - @edge_px
-      end)
+  @doc """
+  The mark with this id whose corners are there in a frame, by what is known of the frame: its size, when and how it was taken.
+  `:edge` if a corner is too near to the edge of it.
+  """
+  @spec reading(t(), id :: non_neg_integer(), [Mark.point(), ...], frame :: map()) ::
+          {:ok, Mark.t()} | :edge
+  def reading(%__MODULE__{} = marks, id, corners, %{width: width, height: height} = frame) do
+    if Enum.all?(corners, &clear?(&1, width, height)) do
+      {x, y} = centre(corners)
+
+      mark = %Mark{
+        family: marks.family,
+        id: id,
+        at_ms: frame.at_ms,
+        x: x,
+        y: y,
+        corners: corners,
+        width: width,
+        height: height
+      }
+
+      {:ok, struct!(mark, placed(corners, frame, marks.size))}
+    else
+      :edge
+    end
   end
 
-  defp mark({id, _wrong_bits, _margin, {x, y}, corners}, marks, frame) do
-    mark = %Mark{
-      family: marks.family,
-      id: id,
-      at_ms: frame.at_ms,
-      x: x,
-      y: y,
-      corners: corners,
-      width: frame.width,
-      height: frame.height
-    }
-
-    struct!(mark, reading(corners, frame, marks.size))
+  defp clear?({x, y}, width, height) do
+    x >= @edge_px and y >= @edge_px and x <= width - 1 - @edge_px and
+      y <= height - 1 - @edge_px
   end
 
-  defp reading(_corners, %Frame{field_of_view: nil}, _size), do: %{}
+  # Where the diagonals cross.
+  defp centre([{x0, y0}, {x1, y1}, {x2, y2}, {x3, y3}]) do
+    {ax, ay, bx, by} = {x2 - x0, y2 - y0, x3 - x1, y3 - y1}
+    t = ((x1 - x0) * by - (y1 - y0) * bx) / (ax * by - ay * bx)
+    {x0 + t * ax, y0 + t * ay}
+  end
 
-  defp reading(corners, frame, size) do
+  defp placed(_corners, %{field_of_view: nil}, _size), do: %{}
+
+  defp placed(corners, frame, size) do
     camera = %{frame | pan: frame.pan || 0.0, tilt: frame.tilt || 0.0}
     Pose.reading(corners, camera, size) || %{}
   end

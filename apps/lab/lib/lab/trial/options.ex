@@ -95,15 +95,19 @@ defmodule Lab.Trial.Options do
     ]
   end
 
-  # Where each hangs, and where it faces: in metres and degrees.
+  # Where each hangs, and where it faces: in metres and degrees. What the robots are told of that may be wrong.
   defp marks do
+    list = {:list, {:tuple, [{:integer, 0, 65_535}, @pose], "{id, {x, y, degrees}}"}}
+
     Vision.Marks.table()
     |> Keyword.merge(
       height: {:number, 0.0, 100.0, "m"},
-      at: [
-        {:list, {:tuple, [{:integer, 0, 65_535}, @pose], "{id, {x, y, degrees}}"}},
-        required: true
-      ]
+      at: [list, default: []],
+      known: {:or, :all, list},
+      robots:
+        {:list,
+         {:tuple, [{:integer, 0, 65_535}, {:check, &robot?/1, "a robot of this run"}],
+          "{id, robot}"}}
     )
   end
 
@@ -134,15 +138,10 @@ defmodule Lab.Trial.Options do
              "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
                Suggest.hint(inspect(who), robots)}
 
-    direct =
-      if options.marks != nil and options.blobs == :direct,
-        do: [{["marks"], "are seen in painted pictures only, blobs: :painted"}],
-        else: []
-
     cut? = Cuts.valid?(options.cuts, robots)
 
     if(cut?, do: [], else: [{["cuts"], cuts <> Wording.show(options.cuts)}]) ++
-      direct ++ kills ++ Event.problems(options.script, robots)
+      kills ++ Event.problems(options.script, robots)
   end
 
   @doc """

@@ -39,7 +39,8 @@ defmodule Lab.Trial.Setup do
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
-  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}]]`), `balls` (`[{x, y}]`) and `boxes`
+  in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}], known: :all]`; `known` are those of
+  which they are told where they hang, `[]` by default), `balls` (`[{x, y}]`) and `boxes`
   (`[{x, y, degrees}]`) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
@@ -100,6 +101,7 @@ defmodule Lab.Trial.Setup do
           mission: setup.mission,
           colours: World.colours(),
           plan: setup.plan,
+          marks: robot.profile.camera && looked_for(options),
           seed: options.seed,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
@@ -119,17 +121,30 @@ defmodule Lab.Trial.Setup do
   @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
   @spec looked_for(map()) :: keyword() | nil
   def looked_for(%{marks: nil}), do: nil
-  def looked_for(%{marks: marks}), do: Keyword.take(marks, [:family, :size])
+
+  def looked_for(%{marks: marks}) do
+    known = Keyword.get(marks, :known, [])
+    known = if known == :all, do: hanging(marks), else: known
+    known = for {id, {x, y, degrees}} <- known, do: {id, {x, y, degrees * :math.pi() / 180}}
+    Keyword.take(marks, [:family, :size, :robots]) ++ [known: known]
+  end
+
+  defp hanging(marks), do: Keyword.get(marks, :at, [])
 
   defp check_marks(%{marks: nil}), do: :ok
 
-  defp check_marks(%{marks: given} = options) do
-    with :ok <- Marks.available(), {:ok, %{family: family}} <- Marks.new(looked_for(options)) do
-      unknown = fn {id, _at} -> Marks.Native.picture(family, id) == nil end
+  defp check_marks(%{marks: given, robots: robots}) do
+    with :ok <- Marks.available(),
+         {:ok, %{family: family}} <- Marks.new(Keyword.take(given, [:family, :size])) do
+      borne = Keyword.get(given, :robots, [])
+      ids = Enum.map(hanging(given) ++ borne, &elem(&1, 0))
+      unknown = Enum.find(ids, &(Marks.Native.picture(family, &1) == nil))
+      stranger = Enum.find(Enum.map(borne, &elem(&1, 1)), &(&1 not in robots))
 
-      case Enum.find(given[:at], unknown) do
-        nil -> :ok
-        {id, _at} -> {:error, "#{family} has no mark #{id}"}
+      cond do
+        unknown -> {:error, "#{family} has no mark #{unknown}"}
+        stranger -> {:error, "marks.robots: #{inspect(stranger)} is no robot of this run"}
+        true -> :ok
       end
     end
   end
@@ -137,10 +152,14 @@ defmodule Lab.Trial.Setup do
   defp hung(nil), do: []
 
   defp hung(marks) do
-    for {id, {x, y, degrees}} <- marks[:at] do
-      pose = Pose.new(x, y, degrees * :math.pi() / 180)
-      [id: id, pose: pose] ++ Keyword.take(marks, [:family, :size, :height])
-    end
+    alike = Keyword.take(marks, [:family, :size, :height])
+
+    hang =
+      for {id, {x, y, degrees}} <- hanging(marks),
+          do: [id: id, pose: Pose.new(x, y, degrees * :math.pi() / 180)] ++ alike
+
+    hang ++
+      for({id, robot} <- Keyword.get(marks, :robots, []), do: [id: id, robot: robot] ++ alike)
   end
 
   defp objects(options) do

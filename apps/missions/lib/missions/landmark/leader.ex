@@ -77,10 +77,10 @@ defmodule Missions.Landmark.Leader do
   end
 
   @doc """
-  Takes a new shape, which all learn from the anchor; `:cost` assigns the slots again.
+  Takes a new shape that was asked for, which all learn from the anchor; `:cost` assigns the slots again.
   """
-  @spec reshape(Landmark.State.t()) :: Landmark.State.t()
-  def reshape(mission) do
+  @spec reshape(Landmark.State.t(), Formation.t()) :: Landmark.State.t()
+  def reshape(mission, formation) do
     leadership = %{
       mission.leadership
       | formed?: false,
@@ -90,7 +90,8 @@ defmodule Missions.Landmark.Leader do
         shape: Shape.new()
     }
 
-    %{mission | leadership: leadership}
+    asked_no = mission.asked_no + 1
+    %{mission | formation: formation, asked_no: asked_no, leadership: leadership}
   end
 
   @doc """

@@ -5,6 +5,7 @@ defmodule Missions.Landmark.Options do
   | option | meaning | default |
   |---|---|---|
   | `formation:` | `{kind, spacing}` or a kind (`Swarm.Formation`) | `{:column, 1.0}` |
+  | `formations:` | what a mark's id makes of the formation, `[{3, :line}, {4, {:circle, 1.5}}]` (`Missions.Landmark.Signs`) | none |
   | `assign:` | `:chain` or `:cost` | `:chain` |
   | `leader_change:` | whether a robot that is nearer takes over | `true` |
   | `colour:` | the landmark's colour, by its name in the colour file | the landmark's |
@@ -18,6 +19,7 @@ defmodule Missions.Landmark.Options do
   def table do
     [
       formation: Formation.type(),
+      formations: {:list, {:tuple, [{:integer, 0, 65_535}, Formation.type()], "{3, :line}"}},
       assign: {:one_of, [:chain, :cost]},
       leader_change: :boolean,
       colour: {:text, "the name of a colour, in quotes,"},
@@ -33,6 +35,8 @@ defmodule Missions.Landmark.Options do
 
       iex> Missions.Landmark.Options.check([formation: :wedge, policy: :majority], 4)
       {:ok, [of: 4, formation: {:wedge, 1.0}, policy: :majority]}
+      iex> Missions.Landmark.Options.check([formations: [{3, :line}]], 4)
+      {:ok, [formations: [{3, {:line, 1.0}}]]}
       iex> Missions.Landmark.Options.check([assign: :luck], 4)
       {:error, "landmark option assign: expected :chain or :cost, got :luck"}
       iex> Missions.Landmark.Options.check([policy: :majority], nil)

@@ -14,6 +14,7 @@ defmodule Missions.Landmark.State do
   defstruct @enforce_keys ++
               [
                 asked_no: 0,
+                signs: nil,
                 colour: @colour,
                 percept: nil,
                 company: nil,
@@ -54,7 +55,7 @@ defmodule Missions.Landmark.State do
               ]
 
   @typedoc """
-  `company` is that of `company/1`, with what it was made of. `asked_no` counts the shapes that people asked for, so that an older anchor does not undo the
+  `company` is that of `company/1`, with what it was made of. `asked_no` counts the shapes that people, or `signs`, asked for, so that an older anchor does not undo the
   newest. `since_ms` is when the phase began, `scan` how the last turn ended, `rescan?` whether
   the next round needs a new one, `tries` how many searches found nothing, `verdict` the result of
   the last round until a phase has acted on it, `order` the followers by slot. `epoch` and
@@ -72,6 +73,7 @@ defmodule Missions.Landmark.State do
           me: atom(),
           formation: Swarm.Formation.t(),
           asked_no: non_neg_integer(),
+          signs: Missions.Landmark.Signs.t() | nil,
           assign: Swarm.Formation.Assignment.method(),
           leader_change?: boolean(),
           colour: String.t(),

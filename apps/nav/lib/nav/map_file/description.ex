@@ -3,7 +3,8 @@ defmodule Nav.MapFile.Description do
   # Reads the description of a map in YAML, as map_server writes it: a line `key: value` for each of `image`
   # (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
   # corner of the picture lies, and how far it is turned round that, counterclockwise in radians), and
-  # optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`.
+  # optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`; and `marks`, which map_server ignores: a list of lines
+  # `- [id, x, y, turn]`, where printed marks hang in the map and how each faces (metres, radians).
   # Read as data: no other YAML is understood, other keys are ignored. Pure.
   #
   # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
@@ -13,7 +14,7 @@ defmodule Nav.MapFile.Description do
   # least `occupied_thresh`.
 
   @enforce_keys [:image, :resolution, :origin, :shades, :known, :transparent]
-  defstruct @enforce_keys
+  defstruct @enforce_keys ++ [marks: []]
 
   @type t :: %__MODULE__{
           image: String.t(),
@@ -21,14 +22,15 @@ defmodule Nav.MapFile.Description do
           origin: {x :: float(), y :: float(), turn :: float()},
           shades: Nav.MapFile.Runs.marks(),
           known: Nav.MapFile.Runs.marks(),
-          transparent: byte()
+          transparent: byte(),
+          marks: [{id :: non_neg_integer(), {x :: float(), y :: float(), turn :: float()}}]
         }
 
   # Radians; a whole turn is as good as none, and a number of degrees is a mistake.
   @most_turn 6.3
 
   @needed ~w(image resolution origin)
-  @known @needed ++ ~w(occupied_thresh free_thresh negate mode)
+  @known @needed ++ ~w(occupied_thresh free_thresh negate mode marks)
 
   @doc """
   Reads a description; the error is one line.
@@ -37,6 +39,11 @@ defmodule Nav.MapFile.Description do
       iex> {:ok, description} = Nav.MapFile.Description.parse(yaml)
       iex> {description.image, description.resolution, description.origin}
       {"floor.pgm", 0.05, {-8.0, -6.0, 0.0}}
+      iex> {:ok, marked} = Nav.MapFile.Description.parse(yaml <> "marks:\\n  - [7, 1.5, -2, 1.57] # in the hall\\n  - [8, 0, 0, 0]\\n")
+      iex> marked.marks
+      [{7, {1.5, -2.0, 1.57}}, {8, {0.0, 0.0, 0.0}}]
+      iex> Nav.MapFile.Description.parse(yaml <> "marks:\\n  - [7, 1.5]\\n")
+      {:error, "marks: expected lines - [id, x, y, turn], in metres and radians, got [[7, 1.5]]"}
       iex> Nav.MapFile.Description.parse("image: floor.pgm")
       {:error, "resolution is missing; needed are image, resolution, origin"}
   """
@@ -46,6 +53,7 @@ defmodule Nav.MapFile.Description do
          {:ok, image} <- image(keys),
          {:ok, resolution} <- number(keys, "resolution", nil, 0.001, 10.0),
          {:ok, origin} <- origin(keys["origin"]),
+         {:ok, marks} <- marks(Map.get(keys, "marks", "[]")),
          {:ok, occupied} <- number(keys, "occupied_thresh", 0.65, 0.0, 1.0),
          {:ok, free} <- number(keys, "free_thresh", min(0.196, occupied), 0.0, 1.0),
          {:ok, light?} <- negate(Map.get(keys, "negate", "0")),
@@ -56,6 +64,7 @@ defmodule Nav.MapFile.Description do
          image: image,
          resolution: resolution,
          origin: origin,
+         marks: marks,
          shades: shades(mode, min(free, occupied), light?),
          known: known(mode, occupied, light?),
          transparent: if(mode == :raw or light?, do: 254, else: 0)
@@ -93,8 +102,8 @@ defmodule Nav.MapFile.Description do
     end
   end
 
-  # An origin may also be written as a list of lines that begin with a dash.
-  defp value("origin", "", lines) do
+  # An origin may also be written as a list of lines that begin with a dash, and marks are.
+  defp value(key, "", lines) when key in ["origin", "marks"] do
     {items, rest} = Enum.split_while(lines, &(item(&1) != nil or String.trim(&1) == ""))
     {"[#{items |> Enum.map(&item/1) |> Enum.filter(& &1) |> Enum.join(", ")}]", rest}
   end
@@ -178,6 +187,30 @@ defmodule Nav.MapFile.Description do
       _other -> {:error, "origin: expected [x, y, turn] in metres and radians, got #{text}"}
     end
   end
+
+  defp marks(text) do
+    with [_, inner] <- Regex.run(~r/^\[(.*)\]$/, text),
+         lists = Regex.scan(~r/\[([^\]]*)\]/, inner, capture: :all_but_first),
+         true <- String.replace(inner, ~r/\[[^\]]*\]|[\s,]/, "") == "",
+         marks = Enum.map(lists, fn [list] -> list |> String.split(",") |> mark() end),
+         true <- Enum.all?(marks) do
+      {:ok, marks}
+    else
+      _other ->
+        {:error, "marks: expected lines - [id, x, y, turn], in metres and radians, got #{text}"}
+    end
+  end
+
+  defp mark([_id, _x, _y, _turn] = parts) do
+    with [id, x, y, turn] <- Enum.map(parts, &parsed(String.trim(&1))),
+         true <- Enum.all?([id, x, y, turn], &is_float/1),
+         true <- id == trunc(id) and id >= 0.0 and id <= 65_535.0,
+         true <- abs(x) <= 1.0e6 and abs(y) <= 1.0e6 and abs(turn) <= @most_turn,
+         do: {trunc(id), {x, y, turn}},
+         else: (_wrong -> nil)
+  end
+
+  defp mark(_too_few_or_many), do: nil
 
   defp negate(text) when text in ~w(0 false), do: {:ok, false}
   defp negate(text) when text in ~w(1 true), do: {:ok, true}

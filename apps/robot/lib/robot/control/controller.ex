@@ -61,12 +61,15 @@ defmodule Robot.Control.Controller do
   frame at which the odometry reads zero, with which the controller estimates the percept's pose by
   `Robot.Localiser`, and `departed`, see there; `plan`, the walls of a floor plan
   (`Nav.Grid`) in the map frame, or an empty `Nav.OccupancyGrid` for those that its sonars will
-  have seen; without either it knows none; `seed`, that of the random numbers with which it looks for its place on the plan.
+  have seen; without either it knows none; `marks`, what it knows of printed marks (`Robot.Config`); `seed`, that of the random numbers with which it looks for its place on the plan.
   """
   @spec new(keyword()) :: t()
   def new(options) do
     options =
-      Keyword.validate!(options, [:profile, start: nil, departed: nil, plan: nil, seed: 0])
+      Keyword.validate!(
+        options,
+        [:profile, start: nil, departed: nil, plan: nil, marks: [], seed: 0]
+      )
 
     case options[:profile] do
       %Profile{} = profile ->
@@ -74,8 +77,7 @@ defmodule Robot.Control.Controller do
           profile: profile,
           escape: Escape.new([]),
           rest: Rest.new([]),
-          localiser:
-            options[:start] && Localiser.new(options[:start], options[:departed], options[:seed]),
+          localiser: options[:start] && localiser(options),
           walls: KnownWalls.new(options[:plan])
         }
 
@@ -83,6 +85,12 @@ defmodule Robot.Control.Controller do
         raise ArgumentError,
               "option profile: expected a %Hal.Profile{}, got #{inspect(other)}"
     end
+  end
+
+  defp localiser(options) do
+    known = Localiser.PrintedMarks.new(options[:marks])
+    localiser = Localiser.new(options[:start], options[:departed], options[:seed])
+    %{localiser | printed: known}
   end
 
   @doc "Sets, changes or (with `nil`) drops the goal."

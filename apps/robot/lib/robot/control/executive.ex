@@ -126,6 +126,7 @@ defmodule Robot.Control.Executive do
           start: config.start,
           departed: departed,
           plan: config.plan,
+          marks: config.marks || [],
           seed: config.seed
         ),
       departure: if(departed, do: {:was, departed}, else: {:near, nil})

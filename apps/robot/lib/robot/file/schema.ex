@@ -42,7 +42,7 @@ defmodule Robot.File.Schema do
      camera: {:or, nil, Device.type(:camera)},
      scan: {:or, nil, Device.type(:scan)},
      colours: {:or, nil, Colours.type(context.colours)},
-     marks: {:or, nil, {:keys, Vision.Marks.table()}},
+     marks: {:or, nil, Robot.Config.marks()},
      save_pictures: {:or, nil, {:keys, Vision.Saver.Options.table()}},
      limits: Body.limits(),
      start: Body.pose(@farthest),

@@ -261,8 +261,10 @@ defmodule Robot.File.Summary do
   defp marks(nil), do: nil
 
   defp marks(given) do
-    {:ok, marks} = Vision.Marks.new(given)
-    "#{marks.family}, #{metres(marks.size)} between their corners"
+    {known, given} = Keyword.pop(given, :known, [])
+    {:ok, marks} = Vision.Marks.new(Keyword.delete(given, :robots))
+    places = if known != [], do: "; it knows where #{length(known)} hang"
+    "#{marks.family}, #{metres(marks.size)} between their corners#{places}"
   end
 
   defp start(%Pose{x: x, y: y, heading: heading}),

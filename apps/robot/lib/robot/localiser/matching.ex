@@ -44,7 +44,8 @@ defmodule Robot.Localiser.Matching do
 
   @doc """
   The reference robots among the marks that match a blob without a rival, each with its blob, in
-  the order of the marks. None is a robot that walls hide (`in_sight`).
+  the order of the marks. None is a robot that walls hide (`in_sight`). `named` are the marks on robots that were read in the
+  picture: a blob with the mark of a robot is that one, and no other.
   """
   @spec pairs(
           [Anchors.mark()],
@@ -53,9 +54,11 @@ defmodule Robot.Localiser.Matching do
           Pose.t(),
           pan :: float(),
           view :: float(),
-          InSight.t()
+          InSight.t(),
+          named :: %{atom() => Vision.Mark.t()}
         ) :: [pair()]
-  def pairs(robots, blobs, belief, exposed, pan, view, in_sight) do
+  def pairs(robots, blobs, belief, exposed, pan, view, in_sight, named \\ %{}) do
+    owners = owners(blobs, named)
     colours = Enum.uniq(for mark <- robots, do: mark.colour)
 
     looks =
@@ -75,7 +78,7 @@ defmodule Robot.Localiser.Matching do
           near?(mark, glance, broad),
           [{_colour, %{width: picture}, _seen} | _] = alike <- [Map.get(looks, mark.colour)],
           expected = expected(mark, belief, exposed, {picture, view}),
-          beside = beside(expected, alike),
+          beside = expected |> beside(alike) |> own(mark.key, owners),
           beside != [] and InSight.seen?(in_sight, mark),
           c <- candidates(expected, beside, belief, exposed),
           do: c
@@ -84,6 +87,28 @@ defmodule Robot.Localiser.Matching do
         mark.reference? and one.sure? and not cut?(blob) and one.width < @fits,
         Enum.all?(candidates, &(&1.cost > one.cost + @worse or not rivals?(one, &1))) do
       %{mark: mark, blob: blob, bearing: one.seen, slack: one.slack, whole?: one.width < @whole}
+    end
+  end
+
+  # Which robot a blob is that shows the mark of just one.
+  defp owners(_blobs, named) when named == %{}, do: %{}
+
+  defp owners(blobs, named) do
+    for blob <- blobs,
+        [id] <- [for({id, mark} <- named, shows?(blob, mark), do: id)],
+        into: %{},
+        do: {blob, {:robot, id}}
+  end
+
+  defp shows?(blob, %{x: x, y: y}),
+    do: x >= blob.left and x <= blob.right and y >= blob.top and y <= blob.bottom
+
+  defp own(beside, _key, owners) when owners == %{}, do: beside
+
+  defp own(beside, key, owners) do
+    case Enum.filter(beside, fn {blob, _, _, _, _} -> owners[blob] == key end) do
+      [] -> Enum.filter(beside, fn {blob, _, _, _, _} -> not is_map_key(owners, blob) end)
+      known -> known
     end
   end
 

@@ -220,6 +220,26 @@ defmodule Robot.Localiser.MonteCarlo do
       else: filter
   end
 
+  @doc """
+  For each pose on the plan the logarithm of the likelihood of what the robot's sonars hear, all zeros if that tells nothing: without a
+  plan, or while it turns. `among` is as in `update/4`.
+  """
+  @spec likelihoods(Percept.t(), among :: Pose.t(), [Pose.t()]) :: [float()]
+  def likelihoods(%Percept{grid: %{closed?: true} = grid, sonar: ranges} = percept, among, poses)
+      when ranges != nil do
+    {readings, counting} = Readings.pack(percept, among)
+
+    if blurred?(percept) or counting < @echoes do
+      Enum.map(poses, fn _pose -> 0.0 end)
+    else
+      packed = for p <- poses, into: <<>>, do: Reference.pack({p.x, p.y, p.heading, 0.0})
+      look = %{grid: grid, readings: readings}
+      for {sum, _fits} <- Population.weigh(packed, look), do: sum / 1024
+    end
+  end
+
+  def likelihoods(_percept, _among, poses), do: Enum.map(poses, fn _pose -> 0.0 end)
+
   defp blurred?(%{odometry: odometry, profile: profile}),
     do: abs(odometry.twist.turn) * profile.sonar_round_s > @blurred
 

@@ -74,8 +74,9 @@ defmodule Robot.Localiser.PlanFilter do
        else: localiser
   end
 
-  # A belief on the plan, in the present frame.
-  defp placed(%{belief: belief, frame: frame}, {pose, variance}) do
+  @doc "A belief at a pose on the plan, with this variance, in the present frame."
+  @spec placed(map(), {Pose.t(), MonteCarlo.Modes.variance()}) :: Belief.t()
+  def placed(%{belief: belief, frame: frame}, {pose, variance}) do
     belief = belief |> Marks.forget() |> Belief.set(pose, variance)
 
     if frame,

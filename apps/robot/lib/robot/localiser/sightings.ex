@@ -31,17 +31,23 @@ defmodule Robot.Localiser.Sightings do
 
   @doc """
   The belief corrected by the percept's picture; `back` is the pose at exposure, relative to the
-  robot's present pose.
+  robot's present pose; `named` are the marks on robots that were read in it, by the names of these.
   """
-  @spec correct(Belief.t(), [Anchors.mark()], Percept.t(), back :: Pose.t()) :: Belief.t()
-  def correct(belief, marks, %Percept{} = percept, %Pose{} = back) do
+  @spec correct(
+          Belief.t(),
+          [Anchors.mark()],
+          Percept.t(),
+          back :: Pose.t(),
+          named :: %{atom() => Vision.Mark.t()}
+        ) :: Belief.t()
+  def correct(belief, marks, %Percept{} = percept, %Pose{} = back, named \\ %{}) do
     {landmarks, robots} = Enum.split_with(marks, &(&1.kind == :landmark))
     picture = {percept, back}
 
     belief
     |> see_landmarks(landmarks, picture)
     |> Silhouettes.align(robots, percept, back)
-    |> see_robots(robots, picture)
+    |> see_robots(robots, picture, named)
     |> weigh(robots, picture)
   end
 
@@ -91,16 +97,16 @@ defmodule Robot.Localiser.Sightings do
     end
   end
 
-  defp see_robots(belief, [], _picture), do: belief
+  defp see_robots(belief, [], _picture, _named), do: belief
 
-  defp see_robots(belief, robots, {percept, back} = picture) do
+  defp see_robots(belief, robots, {percept, back} = picture, named) do
     view = Sighting.field_of_view(percept)
     exposed = exposed(belief, back)
     pan = percept.detections.pan
     in_sight = InSight.new(percept.grid, belief, exposed)
 
     robots
-    |> Matching.pairs(percept.detections.blobs, belief, exposed, pan, view, in_sight)
+    |> Matching.pairs(percept.detections.blobs, belief, exposed, pan, view, in_sight, named)
     |> Enum.reduce(belief, fn %{mark: mark, slack: slack} = pair, belief ->
       distance = if pair.whole?, do: Sighting.distance_by_width(pair.blob, mark.radius, view)
       see(belief, picture, mark, pair.bearing, slack, distance)
@@ -155,9 +161,12 @@ defmodule Robot.Localiser.Sightings do
     Belief.correct(belief, mark.key, error, {{-uy, ux, seen}, {0.0, 0.0}}, noise)
   end
 
-  # The mean squares, along and across, by which a vector of this length that is turned by a normal angle of this variance is
-  # off the tangent: E (1 - cos a)^2 and E (sin a - a)^2, with E cos a = exp(-v / 2) and E a sin a = v exp(-v / 2).
-  defp arc(variance, length) do
+  @doc """
+  The mean squares, along and across, by which a vector of this length (metres) that is turned by a normal angle of this variance
+  (rad2) is off the tangent: E (1 - cos a)^2 and E (sin a - a)^2, with E cos a = exp(-v / 2) and E a sin a = v exp(-v / 2).
+  """
+  @spec arc(variance :: float(), length :: float()) :: {along :: float(), across :: float()}
+  def arc(variance, length) do
     square = length * length
     mean = :math.exp(-variance / 2)
     fourth = :math.pow(mean, 4)

@@ -57,6 +57,40 @@ defmodule Robot.Localiser.MatchingTest do
     Matching.pairs(robots, blobs, belief, @here, 0.0, @view, in_sight)
   end
 
+  test "a blob that shows the mark of a robot is that one, and no other is" do
+    # So near to each other that either could be the blob.
+    [one, two] =
+      for {id, y} <- [mag2: 0.1, mag3: -0.1], do: robot({:robot, id}, {3.0, y}, reference?: true)
+
+    blob = blob({3.0, 0.0})
+
+    seen = %Vision.Mark{
+      family: :tag36h11,
+      id: 12,
+      at_ms: 0,
+      x: blob.x,
+      y: 150.0,
+      corners: [],
+      width: 320,
+      height: 240
+    }
+
+    named = fn names ->
+      in_sight = InSight.new(nil, Belief.new(@here), @here)
+      belief = Belief.new(@here)
+      pairs = Matching.pairs([one, two], [blob], belief, @here, 0.0, @view, in_sight, names)
+      for %{mark: mark} <- pairs, do: mark.key
+    end
+
+    assert named.(%{}) == []
+    assert named.(%{mag3: seen}) == [{:robot, :mag3}]
+    assert named.(%{mag3: %{seen | x: 10.0}}) == []
+    # Two marks in one blob do not tell which of the two robots it is.
+    assert named.(%{mag2: seen, mag3: seen}) == []
+    # It is another one, which none of the two is.
+    assert named.(%{mag9: seen}) == []
+  end
+
   test "a robot behind a wall of the plan is no blob, and no rival of another one" do
     # A wall at x = 2.5, from y = -2 to 0.4.
     cells =

@@ -72,7 +72,12 @@ defmodule Sim.Device.Camera do
         {:frame, %{World.frame(world, robot) | at_ms: at_ms}}
 
       :direct ->
-        {:detections, %{World.detections(world, robot) | at_ms: at_ms}}
+        {:detections, timed(World.detections(world, robot), at_ms)}
     end
+  end
+
+  defp timed(%{marks: marks} = detections, at_ms) do
+    marks = marks && for mark <- marks, do: %{mark | at_ms: at_ms}
+    %{detections | at_ms: at_ms, marks: marks}
   end
 end

@@ -3,7 +3,7 @@ defmodule Sim.World.Mark do
   Describes a printed mark with an id that hangs in a world: flat and upright, one side printed. Pure.
 
   It needs libapriltag, which knows the pictures of the ids (`Vision.Marks.available/0`). It is no obstacle. Hang it a little
-  before its wall: what is in the wall is hidden.
+  before its wall: what is in the wall is hidden. A robot may bear one on its back.
   """
   alias Hal.{Options, Pose}
   alias Vision.Marks
@@ -12,19 +12,24 @@ defmodule Sim.World.Mark do
     family: [{:one_of, Marks.families()}, default: :tag36h11],
     id: [{:integer, 0, 65_535}, required: true],
     size: [{:number, 0.01, 10.0, "m"}, default: 0.16],
-    pose: [{:struct, Pose}, required: true],
+    pose: [{:struct, Pose}, default: nil],
+    robot: [{:check, &is_atom/1, "a robot of the world"}, default: nil],
     height: [{:number, 0.0, 100.0, "m"}, default: 0.3]
   ]
+
+  # So far behind its back, lest its own body hides it (metres).
+  @before 0.02
 
   @enforce_keys Keyword.keys(@table) ++ [:packed]
   defstruct @enforce_keys
 
-  @typedoc "`pose` is the place of its middle, and where it faces; `height` that of its middle; `size` the side of its border, in metres."
+  @typedoc "`pose` is the place of its middle, and where it faces, `nil` of one on the back of a `robot`; `height` that of its middle; `size` the side of its border, in metres."
   @type t :: %__MODULE__{
           family: Vision.Mark.family(),
           id: non_neg_integer(),
           size: float(),
-          pose: Pose.t(),
+          pose: Pose.t() | nil,
+          robot: atom(),
           height: float(),
           packed: Sim.Compute.Marks.packed()
         }
@@ -51,8 +56,21 @@ defmodule Sim.World.Mark do
     struct!(__MODULE__, Map.put(mark, :packed, packed(mark, picture)))
   end
 
+  @doc "The mark on the back of a robot that is there, and of this radius (metres); another one as it is."
+  @spec borne(t(), (robot :: atom() -> {Pose.t(), radius :: float()})) :: t()
+  def borne(%__MODULE__{robot: nil} = mark, _where), do: mark
+
+  def borne(%__MODULE__{robot: robot, packed: packed} = mark, where) do
+    {pose, radius} = where.(robot)
+    pose = Pose.compose(pose, Pose.new(-radius - @before, 0.0, :math.pi()))
+    {cosine, sine} = Sim.Trig.cos_sin(pose.heading)
+    {_x, _y, _cosine, _sine, height, cell, cells, white} = packed
+    %{mark | pose: pose, packed: {pose.x, pose.y, cosine, sine, height, cell, cells, white}}
+  end
+
   # With the white cells round it that it is printed with.
   defp packed(%{pose: pose} = mark, {cells, border, picture}) do
+    pose = pose || Pose.new(0.0, 0.0)
     {cosine, sine} = Sim.Trig.cos_sin(pose.heading)
     edge = :binary.copy(<<1>>, cells + 2)
     rows = for <<row::binary-size(cells) <- picture>>, into: <<>>, do: <<1, row::binary, 1>>

@@ -1,7 +1,7 @@
 defmodule Bench.Marks.Main do
   @moduledoc "Runs the command `mix bench marks`: reads its options, measures, prints the tables."
   alias Bench.{Command, Load, Table}
-  alias Bench.Marks.{Rooms, Runner}
+  alias Bench.Marks.{Plot, Rooms, Round, Runner}
   alias Hal.Cli.Parse
   alias Vision.Marks
 
@@ -12,11 +12,87 @@ defmodule Bench.Marks.Main do
   def run(arguments), do: Command.run(arguments, "marks", table(), &measure/1)
 
   defp measure(given) do
-    case Marks.available() do
-      :ok -> measured(given)
-      {:error, line} -> {:error, [line]}
+    case {Marks.available(), given} do
+      {{:error, line}, _given} -> {:error, [line]}
+      {:ok, %{"round" => map}} -> round(map, given)
+      {:ok, _given} -> measured(given)
     end
   end
+
+  # Each run with and without the marks.
+  defp round(map, given) do
+    {plan, svg} = {given["plan"] || :known, given["svg"]}
+
+    jobs =
+      for what <- [:patrol, :lifted],
+          known <- [[], :all],
+          seed <- given["seeds"] || 1..5,
+          do: {what, known, seed}
+
+    named = fn {what, known, seed} -> "#{what}, #{marks(known)}, seed #{seed}" end
+
+    results =
+      Command.each(
+        jobs,
+        fn {what, known, seed} -> apply(Round, what, [map, seed, plan, known]) end,
+        named
+      )
+
+    of = fn what, known -> for {{^what, ^known, _seed}, {:ok, run}} <- results, do: run end
+
+    kinds =
+      for known <- [[], :all],
+          of.(:patrol, known) != [],
+          do: {marks(known), of.(:patrol, known), of.(:lifted, known)}
+
+    heads = [
+      "#{map}, slipping wheels",
+      "runs",
+      "off: mean / 95 % / max (m)",
+      "within what they tell"
+    ]
+
+    heads = heads ++ ["lifted: right again, of", "median / max (s)"]
+    IO.write(Table.markdown(heads, Enum.map(kinds, &row/1)))
+
+    if svg && kinds != [],
+      do: File.write!(svg, Plot.svg(for {words, runs, _} <- kinds, do: {words, runs}))
+
+    Command.failed(for {job, {:error, line}} <- results, do: "#{named.(job)}: #{line}")
+  end
+
+  defp marks([]), do: "without marks"
+  defp marks(:all), do: "with twelve marks"
+
+  defp row({words, runs, lifted}) do
+    all = for ticks <- runs, {_at_ms, robots} <- ticks, robot <- robots, do: robot
+    offs = Enum.map(all, &elem(&1, 0))
+    inside = Enum.count(all, &elem(&1, 1)) / length(all)
+    right = Enum.reject(lifted, &(&1 == nil))
+
+    off =
+      Enum.map_join(
+        [Enum.sum(offs) / length(offs), Plot.share(offs, 0.95), Enum.max(offs)],
+        " / ",
+        &decimals(&1, 3)
+      )
+
+    times =
+      if right == [],
+        do: "-",
+        else: Enum.map_join([Plot.share(right, 0.5), Enum.max(right)], " / ", &decimals(&1, 1))
+
+    [
+      words,
+      "#{length(runs)}",
+      off,
+      "#{decimals(100 * inside, 1)} %",
+      "#{length(right)} of #{length(lifted)}",
+      times
+    ]
+  end
+
+  defp decimals(number, digits), do: :erlang.float_to_binary(number * 1.0, decimals: digits)
 
   defp measured(given) do
     [pictures, empty, tagged, seed] =
@@ -79,6 +155,12 @@ defmodule Bench.Marks.Main do
        "pictures of each width and condition (100)"},
       {"empty", "N", &Parse.whole(&1, 1..1_000_000), "pictures without a mark (10000)"},
       {"tagged", "N", &Parse.whole(&1, 1..1_000_000), "pictures with one (1000)"},
+      {"round", "MAP", &Parse.text/1,
+       "instead: how far off robots are that patrol it, with marks and without"},
+      {"plan", "HOW", &Parse.choice(&1, known: :known, none: :none),
+       "with --round: whether they have its floor plan (known)"},
+      {"seeds", "A-B", &Parse.span(&1, 0..100_000), "with --round: which seeds (1-5)"},
+      {"svg", "FILE", &Parse.text/1, "with --round: a drawing of that over time"},
       {"seed", "N", &Parse.whole(&1, 0..1_000_000_000), "the seed (1)"}
     ]
   end

@@ -23,7 +23,7 @@ defmodule Mix.Tasks.Bench do
   call from Elixir, beside a copy of the frame and the other backends.
 
   `mix bench marks` measures in how many pictures marks are found, in how many one is seen that is not there, and how wrong
-  their places are.
+  their places are; with `--round MAP`, how far off robots are that know where marks hang, and such that do not.
 
   `mix bench scale` measures what a robot costs in fleets of different sizes, as a table and as bars.
 
