@@ -30,6 +30,8 @@ defmodule Sim.World.MarkReadings do
           {integer(), integer(), integer()} | nil
         ) :: [Vision.Mark.t()]
   def see(map, %CameraFrustum{} = sight, poles, marks, frame, noise) do
+    poles = Columns.poles(Compute.pack(sight), Compute.pack(poles))
+
     for {mark, k} <- Enum.with_index(marks),
         {[left, right] = sides, corners} <- [corners(sight, mark)],
         wide?(corners, mark.family),
@@ -86,12 +88,12 @@ defmodule Sim.World.MarkReadings do
   end
 
   # All poles stand on the floor.
-  defp hides?({x, y, r, height, _paint}, sight, {rx, ry}, low) do
-    at = Columns.meet({sight.x, sight.y}, {x, y, r}, rx, ry)
+  defp hides?({_columns, pole}, sight, {rx, ry}, low) do
+    at = Columns.meet({sight.x, sight.y}, pole, rx, ry)
 
     if at != nil and at < 1.0 do
       depth = at * (sight.cosine * rx + sight.sine * ry)
-      sight.horizon - sight.focal * (height - sight.eye) / max(depth, @nearest) < low
+      sight.horizon - sight.focal * (elem(pole, 3) - sight.eye) / max(depth, @nearest) < low
     else
       false
     end
