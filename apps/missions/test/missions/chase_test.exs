@@ -91,7 +91,7 @@ defmodule Missions.ChaseTest do
           end)
 
         fleet = if rem(k, 2) == 0, do: told(fleet, costs, ms, lost?, silent?), else: fleet
-        {for({id, {driver, _heard}} <- fleet, Driver.drives?(driver), do: id), fleet}
+        {for({id, {driver, _heard}} <- Enum.sort(fleet), Driver.drives?(driver), do: id), fleet}
       end)
       |> elem(0)
     end

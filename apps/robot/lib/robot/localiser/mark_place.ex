@@ -58,8 +58,8 @@ defmodule Robot.Localiser.MarkPlace do
   sides do.
 
       iex> Robot.Localiser.MarkPlace.fuse([{{1.0, 0.0}, {0.04, 0.0, 1.0}}, {{1.5, 0.25}, {1.0, 0.0, 0.04}}])
-      ...> |> then(fn {{x, y}, {xx, xy, yy}} -> for n <- [x, y, xx, xy, yy], do: Float.round(n, 3) end)
-      [1.019, 0.24, 0.077, 0.0, 0.077]
+      ...> |> then(fn {{x, y}, {xx, _xy, yy}} -> for n <- [x, y, xx, yy], do: Float.round(n, 3) end)
+      [1.019, 0.24, 0.077, 0.077]
       iex> Robot.Localiser.MarkPlace.fuse([{{1.0, 0.0}, {0.01, 0.0, 0.01}}, {{2.0, 0.0}, {0.01, 0.0, 0.01}}])
       nil
   """
