@@ -19,6 +19,7 @@ config :swarm,
     flock: Missions.Flock,
     explore: Missions.Explore,
     chase: Missions.Chase,
+    push: Missions.Push,
     teleop: Missions.Teleop
   ]
 

@@ -1,11 +1,12 @@
 defmodule System.ScenariosTest do
-  @moduledoc "All scenarios of test/scenarios hold, side by side."
+  @moduledoc "All scenarios of test/scenarios and examples/thesis hold, side by side."
   use ExUnit.Case, async: true
   alias Console.Scenario.Report
   alias Lab.Scenario
   alias Lab.Scenario.Runner
 
-  @files Path.wildcard(Path.expand("scenarios/*.exs", __DIR__))
+  @files Path.wildcard(Path.expand("scenarios/*.exs", __DIR__)) ++
+           Path.wildcard(Path.expand("../examples/thesis/*.exs", __DIR__))
 
   test "there are enough, each says what it is for and expects something" do
     assert length(@files) >= 20

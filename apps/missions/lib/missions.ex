@@ -10,6 +10,7 @@ defmodule Missions do
   | `flock` | `Missions.Flock` | keeps together on its way along a course, without a leader |
   | `explore` | `Missions.Explore` | sees all of an unknown building, and makes its map |
   | `chase` | `Missions.Chase` | surrounds a ball, and brings it to a place |
+  | `push` | `Missions.Push` | brings a box to a place, which takes two |
   | `teleop` | `Missions.Teleop` | is driven by a person |
 
   A mission is fed events, and returns its phase and what is to be done:

@@ -150,7 +150,7 @@ defmodule Console.PromptTest do
     assert error("kil leader") =~ "did you mean kill?"
 
     assert error("start patorl") =~
-             "expected one of landmark, patrol, flock, explore, chase, teleop; did you mean patrol?"
+             "expected one of landmark, patrol, flock, explore, chase, push, teleop; did you mean patrol?"
 
     assert error("start mga2") =~ "did you mean mag2?"
     assert error("start patrol:perod=9") =~ "did you mean period?"
@@ -210,6 +210,7 @@ defmodule Console.PromptTest do
              "flock",
              "explore",
              "chase",
+             "push",
              "teleop",
              "mag1"
            ]
@@ -220,6 +221,7 @@ defmodule Console.PromptTest do
              "flock",
              "explore",
              "chase",
+             "push",
              "teleop"
            ]
 

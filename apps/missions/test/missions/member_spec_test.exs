@@ -85,7 +85,7 @@ defmodule Swarm.MemberSpecTest do
            ]
 
     assert lines("policies: [mission: :landmrk, formation: 3]") == [
-             "mag1.exs:2: policies.mission: expected nil, :landmark, :patrol, :flock, :explore, :chase or :teleop, got :landmrk; did you mean :landmark?"
+             "mag1.exs:2: policies.mission: expected nil, :landmark, :patrol, :flock, :explore, :chase, :push or :teleop, got :landmrk; did you mean :landmark?"
            ]
 
     assert [line] = lines("policies: [policy: :majority]")

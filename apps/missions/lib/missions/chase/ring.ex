@@ -2,7 +2,8 @@ defmodule Missions.Chase.Ring do
   @moduledoc """
   Places the robots that do not drive the ball round it, out of the way of ball and driver. Pure; metres in the map frame.
 
-  Half of them stand on each side of the line from the ball to the goal, between 45 and 135 degrees from it, at equal angles. Where a
+  Half of them stand on each side of the line from the ball to the goal, at equal angles, between 45 and 135 degrees from it unless another arc
+  is given. Where a
   wall leaves no room, a place is nearer to the ball, or on the robot's own side of it. The robots take the places at the least sum of the squares of their ways
   (`Swarm.Formation.Assignment`).
   """
@@ -10,20 +11,23 @@ defmodule Missions.Chase.Ring do
   alias Nav.Reach
   alias Swarm.Formation.Assignment
 
-  @from :math.pi() / 4
+  @arc {:math.pi() / 4, 3 * :math.pi() / 4}
   @shares [1.0, 0.85, 0.7]
   # Off where the robot is, seen from the ball.
   @beside [0, 1, -1, 2, -2, 3, -3] |> Enum.map(&(&1 * :math.pi() / 6))
 
+  @typedoc "Between these angles from the line to the goal, in radians."
+  @type arc :: {from :: float(), to :: float()}
+
   @doc "The places of so many robots round the ball."
-  @spec places(non_neg_integer(), Pose.point(), Pose.point(), float()) :: [Pose.point()]
-  def places(count, ball, goal, radius) do
+  @spec places(non_neg_integer(), Pose.point(), Pose.point(), float(), arc()) :: [Pose.point()]
+  def places(count, ball, goal, radius, {from, to} \\ @arc) do
     direction = Missions.Chase.Push.direction(ball, goal)
     left = div(count + 1, 2)
 
     for {side, n} <- [{1, left}, {-1, count - left}],
         k <- 1..n//1,
-        do: at(ball, radius, direction + side * (@from + (k - 0.5) / n * :math.pi() / 2))
+        do: at(ball, radius, direction + side * (from + (k - 0.5) / n * (to - from)))
   end
 
   @doc """
@@ -41,11 +45,12 @@ defmodule Missions.Chase.Ring do
           Pose.point(),
           float(),
           Nav.Grid.t() | nil,
-          float()
+          float(),
+          arc()
         ) ::
           Pose.point() | nil
-  def place(me, robots, ball, goal, ring, grid, radius) do
-    places = places(map_size(robots), ball, goal, ring)
+  def place(me, robots, ball, goal, ring, grid, radius, arc \\ @arc) do
+    places = places(map_size(robots), ball, goal, ring, arc)
     robots = Enum.sort(robots)
 
     rows =
