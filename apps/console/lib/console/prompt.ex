@@ -176,8 +176,12 @@ defmodule Console.Prompt do
         "gamepad mag2, gamepad off     drives it by #{@gamepad}, or by another path",
         "stop, stop mag2               the fleet or one robot stops and stands",
         "start, start mag2             starts the mission again, from the search",
-        "start patrol:period=90        starts another mission:",
-        "                              " <> Enum.join(MissionRegistry.names(), ", "),
+        "start patrol:period=90        starts another mission:"
+      ] ++
+      for names <- Enum.chunk_every(MissionRegistry.names(), 5) do
+        "                              " <> Enum.join(names, ", ")
+      end ++
+      [
         "replace flock                 they stand, change the mission, and go on;",
         "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",

@@ -261,7 +261,7 @@ defmodule Console.OptionsTest do
     assert options.mission == {Missions.Landmark, of: 4, policy: :majority}
 
     assert error("--mission patorl") ==
-             ~s(--mission: mission "patorl" is not known; expected one of landmark, patrol, flock, explore, chase, teleop; did you mean patrol?)
+             ~s(--mission: mission "patorl" is not known; expected one of landmark, patrol, flock, explore, chase, push, teleop; did you mean patrol?)
 
     assert error("--mission patrol:period=5") ==
              "--mission: patrol option period: expected a number from 10 to 3600 s, got 5"
@@ -273,6 +273,6 @@ defmodule Console.OptionsTest do
              "--save-map needs a mission that makes a map, such as --mission explore"
 
     assert Options.help() =~
-             ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore, chase or teleop/
+             ~r/--mission NAME\[:KEY=VALUE,…\] +landmark, patrol, flock, explore, chase, push or teleop/
   end
 end

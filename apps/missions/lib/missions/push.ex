@@ -21,8 +21,6 @@ defmodule Missions.Push do
   @tell_ms 200
   @forget_ms 10_000
   @most_peers 256
-  # From where the others watch.
-  @ring 2.6
   # The estimate is too uncertain to push by (m, rad), until it is this certain.
   @unsure 0.22
   @unsure_heading 0.3
@@ -70,10 +68,6 @@ defmodule Missions.Push do
   the left, -1 on the right; `stage` how far it is there, `direction` that of the push.
   """
   @type t :: %__MODULE__{}
-
-  @doc "How far from the middle of the box the others watch, in metres."
-  @spec ring() :: float()
-  def ring, do: @ring
 
   @impl Robot.Mission
   def phases, do: [:search, :watch, :approach, :push, :done]
@@ -161,7 +155,7 @@ defmodule Missions.Push do
   # One that looks for the box before its feet goes back, to see it whole.
   defp near(%{phase: :search, search: %{kind: :turn} = search} = mission, {x, y}, %{pose: pose}) do
     angle = :math.atan2(pose.y - y, pose.x - x)
-    to = {x + @ring * :math.cos(angle), y + @ring * :math.sin(angle)}
+    to = {x + Moves.ring() * :math.cos(angle), y + Moves.ring() * :math.sin(angle)}
     %{mission | search: %Search{n: search.n + 1, kind: :go, to: to}}
   end
 

@@ -11,6 +11,7 @@ defmodule Missions.Push.Moves do
   alias Robot.Percept.CameraPointing
 
   # From where the others watch, unless they see nothing for so long, as too near to a box that lies elsewhere.
+  @ring 2.6
   @arc {0.35, 1.4}
   @blind_ms 4_000
   @back 0.7
@@ -22,6 +23,10 @@ defmodule Missions.Push.Moves do
   @tolerance 0.1
   @heading_tolerance 0.15
   @aside_ms 8_000
+
+  @doc "How far from the middle of the box robots watch it, in metres: nearer, they do not see its foot."
+  @spec ring() :: float()
+  def ring, do: @ring
 
   @doc "The goal of this tick, and the mission with what it is to remember of it."
   @spec goal(Push.t(), map() | nil, Robot.Percept.t()) :: {Robot.Mission.effect(), Push.t()}
@@ -60,7 +65,7 @@ defmodule Missions.Push.Moves do
 
     # Too near to the box, which may lie elsewhere, none sees its foot.
     unseen? = mission.now_ms - mission.box.seen_ms > @blind_ms
-    ring = if unseen?, do: Push.ring() + @back, else: Push.ring()
+    ring = if unseen?, do: @ring + @back, else: @ring
 
     case Ring.place(
            mission.me,
