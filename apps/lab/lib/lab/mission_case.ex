@@ -15,6 +15,7 @@ defmodule Lab.MissionCase do
   | junk from others changes nothing | terms that are no messages, letters of other missions and versions |
   | its own letters, spoilt, do not end it | fields that are missing, and values of other types |
   | its state is bounded | its size at the end, and in the middle |
+  | what it draws is drawn | each part of its layer, once a second |
   | it stops when told, and starts again | phases; true poses |
   | what it names itself | `always:`, asked each second |
 
@@ -116,7 +117,11 @@ defmodule Lab.MissionCase do
           {:error, kind} <- [Message.check(message)],
           do: "it sends a #{kind} that is not whole"
 
-    always = if rem(trial.at_ms, 1_000) == 0, do: named(options[:always].(trial)), else: []
+    always =
+      if rem(trial.at_ms, 1_000) == 0,
+        do: named(options[:always].(trial)) ++ undrawable(trial),
+        else: []
+
     letters = for %Message{kind: :mission, body: letter} <- sent, do: letter
 
     seen = %{
@@ -127,6 +132,32 @@ defmodule Lab.MissionCase do
 
     {%{run | source: trial}, seen}
   end
+
+  # What is drawn of a mission is asked for by each view (`t:Robot.Mission.layer/0`).
+  defp undrawable(trial) do
+    for {_id, %{layer: layer}} <- Trial.claims(trial),
+        part <- layer,
+        not drawable?(part),
+        do: "its layer has #{inspect(part, limit: 8)}, which is not drawn"
+  end
+
+  defp drawable?({:polyline, name, points}), do: is_binary(name) and Enum.all?(points, &place?/1)
+
+  defp drawable?({:cells, name, size, points}),
+    do: is_binary(name) and is_number(size) and Enum.all?(points, &place?/1)
+
+  defp drawable?({:points, name, points}) do
+    is_binary(name) and
+      Enum.all?(
+        points,
+        &match?({x, y, label} when is_number(x) and is_number(y) and is_binary(label), &1)
+      )
+  end
+
+  defp drawable?(_other), do: false
+
+  defp place?({x, y}), do: is_number(x) and is_number(y)
+  defp place?(_other), do: false
 
   defp named(:ok), do: []
   defp named(line), do: [line]

@@ -38,13 +38,18 @@ defmodule Lab.MissionCaseTest do
     def claims, do: {1, Said}
 
     @impl Robot.Mission
-    def option_table, do: [fault: {:one_of, [:grows, :random, :gullible, :claims, :none, :lost]}]
+    def option_table,
+      do: [fault: {:one_of, [:grows, :random, :gullible, :claims, :layer, :none, :lost]}]
 
     @impl Robot.Mission
     def messages, do: {1, [word: [text: {:text, "a word"}]]}
 
     @impl Robot.Mission
     def init(_robot, options), do: {:idle, {options[:fault], []}, []}
+
+    @impl Robot.Mission
+    def layer({:layer, _state}), do: [{:lines, "no such thing", []}]
+    def layer(_mission), do: []
 
     @impl Robot.Mission
     def halted({:lost, _state}), do: nil
@@ -69,7 +74,8 @@ defmodule Lab.MissionCaseTest do
     for {fault, line} <- [
           {:grows, ~r/the state of mag1 grows: \d+ words in the middle/},
           {:random, ~r/the second run of the same seed was another/},
-          {:claims, ~r/it sends a heartbeat that is not whole/}
+          {:claims, ~r/it sends a heartbeat that is not whole/},
+          {:layer, ~r/its layer has {:lines, "no such thing", \[\]}, which is not drawn/}
         ] do
       assert [_ | _] =
                lines = MissionCase.problems({Wrong, fault: fault}, seeds: [1], seconds: 12)

@@ -79,9 +79,12 @@ defmodule Missions.Push.Words do
 
     [
       {:points, "goal of the box", [point(mission.goal, "goal")]},
-      {:lines, "where the robots believe the box to be", [corners ++ [first]]},
-      {:lines, "the way of the box", if(length(mission.trail) > 1, do: [mission.trail], else: [])}
-    ]
+      {:polyline, "where the robots believe the box to be", corners ++ [first]}
+    ] ++
+      if(length(mission.trail) > 1,
+        do: [{:polyline, "the way of the box", mission.trail}],
+        else: []
+      )
   end
 
   defp point({x, y}, label), do: {x, y, label}
