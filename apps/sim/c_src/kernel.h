@@ -105,11 +105,11 @@ void sim_field(const uint8_t *walls, int64_t width, int64_t height, uint8_t *fie
 double sim_wall(const sim_map *map, double x, double y, double rx, double ry, double most,
                 int *axis);
 
-/* The ranges of a robot's sonars. `near` is scratch for `count` discs. */
+/* The ranges of a robot's sonars. `near` is scratch for twice `count` discs. */
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges);
 
-/* The ranges of a robot's lidar, two bytes each, the higher first: millimetres, 65535 for nothing. */
+/* The ranges of a robot's lidar, two bytes each, the higher first: millimetres, 65535 for nothing. `near` is scratch for `count` discs. */
 void sim_scan(const sim_map *map, const sim_disc *discs, size_t count, const sim_lidar *lidar,
               const sim_noise *noise, sim_disc *near, uint8_t *ranges);
 

@@ -158,7 +158,7 @@ static sim_disc *get_discs(ErlNifEnv *env, ERL_NIF_TERM term, size_t *count)
     if (!enif_inspect_binary(env, term, &packed) || packed.size % sizeof(sim_disc) != 0 ||
         packed.size / sizeof(sim_disc) > MOST_BODIES)
         return NULL;
-    sim_disc *discs = enif_alloc(2 * packed.size + sizeof(sim_disc));
+    sim_disc *discs = enif_alloc(3 * packed.size + sizeof(sim_disc));
     if (discs == NULL)
         return NULL;
     memcpy(discs, packed.data, packed.size);

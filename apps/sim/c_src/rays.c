@@ -165,17 +165,39 @@ static size_t around(const sim_disc *discs, size_t count, size_t self, double ox
     return found;
 }
 
+/* The discs that may be within `most` of one of the sensors, rather too many than too few, but for the robot's own. */
+static size_t about(const sim_disc *discs, size_t count, const sim_ring *ring, sim_disc *close)
+{
+    double reach = 0.0;
+    size_t found = 0;
+
+    for (size_t k = 0; k < ring->sensors; k++) {
+        const double *sensor = ring->geometry + k * SIM_SENSOR;
+        double r = fabs(sensor[0]) + fabs(sensor[1]);
+        reach = r > reach ? r : reach;
+    }
+    reach = reach + ring->most + 1.0e-6;
+    for (size_t n = 0; n < count; n++) {
+        double mx = discs[n].x - ring->x, my = discs[n].y - ring->y, far = reach + discs[n].radius;
+        if (n != ring->self && mx * mx + my * my <= far * far)
+            close[found++] = discs[n];
+    }
+    return found;
+}
+
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges)
 {
     const double c = ring->cosine, s = ring->sine, most = ring->most;
+    sim_disc *close = near + count;
+    size_t candidates = about(discs, count, ring, close);
 
     for (size_t k = 0; k < ring->sensors; k++) {
         const double *sensor = ring->geometry + k * SIM_SENSOR;
         double ox = ring->x + c * sensor[0] - s * sensor[1];
         double oy = ring->y + s * sensor[0] + c * sensor[1];
         double best = most;
-        size_t found = around(discs, count, ring->self, ox, oy, most, near);
+        size_t found = around(close, candidates, SIZE_MAX, ox, oy, most, near);
 
         for (size_t n = 0; n < SIM_RAYS; n++) {
             double dx = sensor[2 + 2 * n], dy = sensor[3 + 2 * n];

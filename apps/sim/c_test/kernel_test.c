@@ -98,7 +98,7 @@ static void rays(const sim_map *map)
 static void sonars(const sim_map *map)
 {
     size_t count = draw() % 5, sensors = draw() % 17;
-    sim_disc *discs = exactly(count * sizeof *discs), *near = exactly(count * sizeof *near);
+    sim_disc *discs = exactly(count * sizeof *discs), *near = exactly(2 * count * sizeof *near);
     double *geometry = exactly(sensors * SIM_SENSOR * sizeof *geometry);
     double *ranges = exactly(sensors * sizeof *ranges);
     sim_noise noise = {draw() % 2, draw(), draw(), draw()};
@@ -190,7 +190,7 @@ static void known(void)
     double geometry[SIM_SENSOR] = {0.2, 0.0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0}, range;
     sim_map map = {field, 100, 100, 0.05};
     sim_ring ring = {0, 0.0, 0.0, 1.0, 0.0, 0.15, 5.1, geometry, 1};
-    sim_disc discs[2] = {{0, 0, 0.2}, {1.0, 0, 0.2}}, near[2];
+    sim_disc discs[2] = {{0, 0, 0.2}, {1.0, 0, 0.2}}, near[4];
     sim_noise quiet = {0, 0, 0, 0};
     int axis;
 

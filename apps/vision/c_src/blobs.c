@@ -256,7 +256,7 @@ static enum blobs_result find_rows(const struct blobs_picture *picture, uint32_t
     }
     /* The lowest row is above an empty one. */
     if (result == BLOBS_DONE &&
-        join_rows(scratch->runs + (row + 1) % 2 * width, above_count, NULL, 0, row, min_area, scratch) != 0)
+        join_rows(scratch->runs + (row + 1) % 2 * width, above_count, scratch->runs, 0, row, min_area, scratch) != 0)
         result = BLOBS_MEMORY;
     scratch->row = row;
     scratch->above_count = above_count;
