@@ -6,7 +6,7 @@ defmodule Player.Devices do
   |---|---|
   | `position2d:0`, `power:0`, `localize:0`, `speech:0`, `simulation:0`, `map:0` | all |
   | `sonar:0`, `ranger:0` | sonars |
-  | `ir:0`, `ranger:1` | infrareds |
+  | `ir:0`, `ranger:1` | infrareds that its base reports |
   | `bumper:0` | bumpers |
   | `laser:0`, `ranger:2` | a lidar |
   | `ptz:0`, `blobfinder:0`, `fiducial:0` | a camera |

@@ -285,7 +285,7 @@ defmodule Player.Session do
   defp command({:speech, 1}, %{text: text}, session) do
     text = text |> String.split(<<0>>) |> hd()
 
-    if String.printable?(text),
+    if String.valid?(text) and text =~ ~r/\A[[:print:]]+\z/u,
       do: {session, [{:say, String.slice(text, 0, @most_text)}]},
       else: {session, []}
   end

@@ -64,7 +64,9 @@ defmodule Player.Source do
 
     with {:ok, board} <- Board.find(robot),
          {:ok, %{profile: profile}, _at_ms} <- Board.fetch(board, :release, :infinity) do
-      %{profile: profile, sonars: profile.sonars, pictures?: pictures?}
+      # Not every base with infrareds reports them.
+      irs = if Board.fetch(board, :ir, :infinity) == :error, do: [], else: profile.irs
+      %{profile: %{profile | irs: irs}, sonars: profile.sonars, pictures?: pictures?}
     else
       _elsewhere ->
         beams = with %{sonar: beams} <- module.about(live, robot), do: beams

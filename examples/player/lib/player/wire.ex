@@ -170,7 +170,8 @@ defmodule Player.Wire do
         {:list,
          [mean: @pose2d, covariance: {:tuple, [:double, :double, :double]}, alpha: :double]}
     ],
-    {:simulation, :req, 1} => @named_pose,
+    # Clients send what their memory holds for a pose.
+    {:simulation, :req, 1} => [name: :bytes, pose: {:raw, 24}],
     {:simulation, :ack, 1} => @named_pose,
     {:camera, :data, 1} => @image,
     {:map, :req, 1} => [],

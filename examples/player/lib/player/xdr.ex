@@ -8,6 +8,7 @@ defmodule Player.Xdr do
   | `:float`, `:double` | a number | 4, 8 |
   | `:bytes` | a binary: its length, its length, itself, zeros up to a multiple of 4 | 8 and more |
   | `{:list, type}` | a list: its length, its length, its elements | 8 and more |
+  | `{:raw, size}` | a binary of so many bytes, whatever they are | |
   | `{:tuple, types}` | a tuple | |
   | `[field: type]` | a map | |
 
@@ -21,6 +22,7 @@ defmodule Player.Xdr do
           | :float
           | :double
           | :bytes
+          | {:raw, size :: pos_integer()}
           | {:list, type()}
           | {:tuple, [type()]}
           | [{atom(), type()}]
@@ -45,6 +47,8 @@ defmodule Player.Xdr do
     size = byte_size(value)
     [<<size::32, size::32>>, value, :binary.copy(<<0>>, padding(size))]
   end
+
+  defp put({:raw, size}, value) when byte_size(value) == size, do: value
 
   defp put({:list, type}, values) do
     count = length(values)
@@ -80,6 +84,12 @@ defmodule Player.Xdr do
     padding = padding(size)
 
     with <<value::binary-size(size), _zeros::binary-size(padding), rest::binary>> <- rest,
+         do: {:ok, value, rest},
+         else: (_short -> :error)
+  end
+
+  defp take({:raw, size}, bytes) do
+    with <<value::binary-size(size), rest::binary>> <- bytes,
          do: {:ok, value, rest},
          else: (_short -> :error)
   end
