@@ -97,7 +97,8 @@ defmodule Player.Readings do
       end
 
     mean = {x * 1.0, y * 1.0, (about.heading || 0.0) * 1.0}
-    covariance = {place * place, place * place, heading * heading * 1.0}
+    # Variances of x, y and yaw, and the three covariances.
+    covariance = {place * place, place * place, heading * heading * 1.0, 0.0, 0.0, 0.0}
     hypothesis = %{mean: mean, covariance: covariance, alpha: 1.0}
     %{pending: 0, pending_time: 0.0, hypotheses: [hypothesis]}
   end

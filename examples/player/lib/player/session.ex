@@ -257,7 +257,8 @@ defmodule Player.Session do
             into: "",
             do: binary_part(cells, row * columns + tile.column, tile.width)
 
-      {:ok, %{tile | range: 1, data: data}}
+      data = :zlib.compress(data)
+      {:ok, %{tile | count: byte_size(data), range: 1, data: data}}
     else
       :error
     end

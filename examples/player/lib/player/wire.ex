@@ -66,7 +66,16 @@ defmodule Player.Wire do
     bottom: :u32,
     range: :float
   ]
-  @tile [column: :u32, row: :u32, width: :u32, height: :u32]
+  # The number of bytes stands before what a cell of 1 means, and these are compressed by zlib.
+  @tile [
+    column: :u32,
+    row: :u32,
+    width: :u32,
+    height: :u32,
+    count: :u32,
+    range: :i32,
+    data: :opaque
+  ]
 
   @layouts %{
     {:player, :req, 1} => [],
@@ -166,9 +175,7 @@ defmodule Player.Wire do
     {:localize, :data, 1} => [
       pending: :u32,
       pending_time: :double,
-      hypotheses:
-        {:list,
-         [mean: @pose2d, covariance: {:tuple, [:double, :double, :double]}, alpha: :double]}
+      hypotheses: {:list, [mean: @pose2d, covariance: @pose3d, alpha: :double]}
     ],
     # Clients send what their memory holds for a pose.
     {:simulation, :req, 1} => [name: :bytes, pose: {:raw, 24}],
@@ -176,8 +183,8 @@ defmodule Player.Wire do
     {:camera, :data, 1} => @image,
     {:map, :req, 1} => [],
     {:map, :ack, 1} => [scale: :float, width: :u32, height: :u32, origin: @pose2d],
-    {:map, :req, 2} => @tile ++ [range: :i32, data: :bytes],
-    {:map, :ack, 2} => @tile ++ [range: :i32, data: :bytes],
+    {:map, :req, 2} => @tile,
+    {:map, :ack, 2} => @tile,
     {:ranger, :data, 1} => [ranges: {:list, :double}],
     {:ranger, :req, 1} => [],
     {:ranger, :ack, 1} => @geometry ++ [poses: {:list, @pose3d}, sizes: {:list, @size}],

@@ -7,6 +7,7 @@ defmodule Player.Xdr do
   | `:u32`, `:i32` | a whole number; Player's smaller ones and its enumerations, too | 4 |
   | `:float`, `:double` | a number | 4, 8 |
   | `:bytes` | a binary: its length, its length, itself, zeros up to a multiple of 4 | 8 and more |
+  | `:opaque` | the same with its length once | 4 and more |
   | `{:list, type}` | a list: its length, its length, its elements | 8 and more |
   | `{:raw, size}` | a binary of so many bytes, whatever they are | |
   | `{:tuple, types}` | a tuple | |
@@ -22,6 +23,7 @@ defmodule Player.Xdr do
           | :float
           | :double
           | :bytes
+          | :opaque
           | {:raw, size :: pos_integer()}
           | {:list, type()}
           | {:tuple, [type()]}
@@ -43,9 +45,11 @@ defmodule Player.Xdr do
   defp put(:float, value), do: <<value::float-32>>
   defp put(:double, value), do: <<value::float-64>>
 
-  defp put(:bytes, value) do
+  defp put(:bytes, value), do: [<<byte_size(value)::32>> | put(:opaque, value)]
+
+  defp put(:opaque, value) do
     size = byte_size(value)
-    [<<size::32, size::32>>, value, :binary.copy(<<0>>, padding(size))]
+    [<<size::32>>, value, :binary.copy(<<0>>, padding(size))]
   end
 
   defp put({:raw, size}, value) when byte_size(value) == size, do: value
@@ -80,7 +84,10 @@ defmodule Player.Xdr do
   defp take(:float, <<value::float-32, rest::binary>>), do: {:ok, value, rest}
   defp take(:double, <<value::float-64, rest::binary>>), do: {:ok, value, rest}
 
-  defp take(:bytes, <<size::32, size::32, rest::binary>>) when size <= byte_size(rest) do
+  defp take(:bytes, <<size::32, size::32, rest::binary>>),
+    do: take(:opaque, <<size::32, rest::binary>>)
+
+  defp take(:opaque, <<size::32, rest::binary>>) when size <= byte_size(rest) do
     padding = padding(size)
 
     with <<value::binary-size(size), _zeros::binary-size(padding), rest::binary>> <- rest,

@@ -156,7 +156,8 @@ defmodule Player.ReadingsTest do
     sure = %{uncertainty: %{radius: 0.2447746830680816, heading: 0.02}}
 
     <<0::32, 0.0::float, 1::32, 1::32, 1.0::float, 2.0::float, 0.5::float, x2::float, y2::float,
-      a2::float, 1.0::float>> = payload({:localize, 0}, about(sure))
+      a2::float, 0.0::float, 0.0::float, 0.0::float,
+      1.0::float>> = payload({:localize, 0}, about(sure))
 
     assert_in_delta x2, 0.01, 1.0e-6
     assert_in_delta y2, 0.01, 1.0e-6
