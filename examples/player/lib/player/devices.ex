@@ -1,6 +1,6 @@
 defmodule Player.Devices do
   @moduledoc """
-  Says which of Player's devices a robot has, and what they answer when they are asked for what does not change. Pure.
+  Says which of Player's devices a robot has, and what they answer when they are asked for what they do not say by themselves. Pure.
 
   | device | of robots with |
   |---|---|
@@ -15,7 +15,9 @@ defmodule Player.Devices do
   Poses are in the robot's own frame, whose origin is the middle between its wheels.
   """
   alias Hal.{Pose, Profile}
+  alias Lab.Recording.Drawing
   alias Player.{Source, Wire}
+  alias Sim.{Floorplan, Scene}
 
   # What Player calls a driver.
   @driver "convoy"
@@ -108,6 +110,53 @@ defmodule Player.Devices do
   end
 
   def answer(_device, _subtype, _body), do: :error
+
+  @doc """
+  What the fleet's scene answers: where a thing is, by its name (`simulation`), the floor plan and a part of it (`map`); `:error` for
+  what there is not.
+  """
+  @spec seen(Wire.device(), subtype :: non_neg_integer(), map(), Scene.t()) ::
+          {:ok, map()} | :error
+  def seen({:simulation, 0}, 1, %{name: name}, scene) do
+    # It may end in a zero.
+    text = name |> String.split(<<0>>) |> hd()
+
+    case Enum.find(scene.robots ++ scene.objects, &("#{&1.id}" == text)) do
+      %{pose: %Pose{x: x, y: y, heading: heading}} ->
+        {:ok, %{name: name, pose: {x * 1.0, y * 1.0, heading * 1.0}}}
+
+      _none ->
+        :error
+    end
+  end
+
+  def seen({:map, 0}, _subtype, _values, %{map: nil}), do: :error
+
+  def seen({:map, 0}, 1, _none, %{map: map}) do
+    {columns, rows, size} = Drawing.cells(map)
+    {width, height} = Floorplan.size(map)
+    origin = {-width / 2, -height / 2, 0.0}
+    {:ok, %{scale: size * 1.0, width: columns, height: rows, origin: origin}}
+  end
+
+  # A cell is 1 where there is wall, -1 where there is none.
+  def seen({:map, 0}, 2, tile, %{map: map}) do
+    {columns, rows, _size} = Drawing.cells(map)
+
+    if tile.column + tile.width <= columns and tile.row + tile.height <= rows do
+      cells = Drawing.ground(map, <<1>>, <<-1>>)
+
+      data =
+        for row <- tile.row..(tile.row + tile.height - 1)//1,
+            into: "",
+            do: binary_part(cells, row * columns + tile.column, tile.width)
+
+      data = :zlib.compress(data)
+      {:ok, %{tile | count: byte_size(data), range: 1, data: data}}
+    else
+      :error
+    end
+  end
 
   defp elements(0, body), do: {Pose.new(0, 0), body.sonars}
   defp elements(1, body), do: {Pose.new(0, 0), body.profile.irs}

@@ -10,9 +10,8 @@ defmodule Player.Session do
   estimate is not touched, nor what other clients read.
   """
   alias Hal.Pose
-  alias Lab.Recording.Drawing
   alias Player.{Devices, Queue, Source, Wire}
-  alias Sim.{Floorplan, Scene}
+  alias Sim.Scene
 
   # Requests that libplayerc makes of all kinds of programs, and that change nothing here: of sonar, ir, ranger (power),
   # position2d (motors on, modes).
@@ -217,50 +216,9 @@ defmodule Player.Session do
   def scene(session, message, scene, at_s) do
     {:ok, values} = Wire.values(message)
 
-    case shown(message, values, scene) do
+    case Devices.seen(message.device, message.subtype, values, scene) do
       {:ok, values} -> ack(session, message.device, message.subtype, values, at_s)
       :error -> nack(session, message, at_s)
-    end
-  end
-
-  # The name may end in a zero.
-  defp shown(%{device: {:simulation, 0}}, %{name: name}, scene) do
-    text = name |> String.split(<<0>>) |> hd()
-
-    case Enum.find(scene.robots ++ scene.objects, &("#{&1.id}" == text)) do
-      %{pose: %Pose{x: x, y: y, heading: heading}} ->
-        {:ok, %{name: name, pose: {x * 1.0, y * 1.0, heading * 1.0}}}
-
-      _none ->
-        :error
-    end
-  end
-
-  defp shown(_map, _values, %{map: nil}), do: :error
-
-  defp shown(%{subtype: 1}, _none, %{map: map}) do
-    {columns, rows, size} = Drawing.cells(map)
-    {width, height} = Floorplan.size(map)
-    origin = {-width / 2, -height / 2, 0.0}
-    {:ok, %{scale: size * 1.0, width: columns, height: rows, origin: origin}}
-  end
-
-  # A cell is 1 where there is wall, -1 where there is none.
-  defp shown(%{subtype: 2}, tile, %{map: map}) do
-    {columns, rows, _size} = Drawing.cells(map)
-
-    if tile.column + tile.width <= columns and tile.row + tile.height <= rows do
-      cells = Drawing.ground(map, <<1>>, <<-1>>)
-
-      data =
-        for row <- tile.row..(tile.row + tile.height - 1)//1,
-            into: "",
-            do: binary_part(cells, row * columns + tile.column, tile.width)
-
-      data = :zlib.compress(data)
-      {:ok, %{tile | count: byte_size(data), range: 1, data: data}}
-    else
-      :error
     end
   end
 
