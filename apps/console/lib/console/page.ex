@@ -89,12 +89,15 @@ defmodule Console.Page do
 
   # A client of a door of its own knows no token.
   defp reached(%{service: service, address: address}) do
-    if Page.Service.own_door?(service) and not Page.Access.loopback?(address),
+    if own_door?(service) and not Page.Access.loopback?(address),
       do:
         {:error,
          "its programs cannot say a token: it is served on this machine alone (ssh -L brings a port of it elsewhere)"},
       else: :ok
   end
+
+  defp own_door?(service),
+    do: service != nil and Code.ensure_loaded?(service) and function_exported?(service, :door, 1)
 
   # Any that is free is chosen once: a door that was restarted must be where the open pages look for it.
   defp free(%{address: address, port: port}) do
@@ -124,7 +127,7 @@ defmodule Console.Page do
     at = options |> Map.take([:address, :port]) |> Map.put(:page, page)
 
     door =
-      if Page.Service.own_door?(options.service),
+      if own_door?(options.service),
         do: options.service.door(at),
         else: {Door, at}
 

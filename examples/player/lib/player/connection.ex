@@ -11,7 +11,7 @@ defmodule Player.Connection do
   alias Console.Orders
   alias Console.Page.Line
   alias Mesh.Distribution.Access.Bucket
-  alias Player.{Door, Queue, Session, Source, Wire}
+  alias Player.{Queue, Session, Source, Wire}
   alias Swarm.Camera
 
   # A word of driving lasts so long; then the robot stands.
@@ -23,9 +23,17 @@ defmodule Player.Connection do
   @pause_ms 2_000
   @pictures_hz 5
 
-  @doc "Serves the client of this socket until it goes; `at` is where it came in (`Player.Door`)."
-  @spec run(:gen_tcp.socket(), %{robot: atom(), door: pid(), page: map()}) :: no_return()
-  def run(socket, %{robot: robot, door: door, page: page}) do
+  @doc """
+  Serves the client of this socket until it goes. `claim` is asked, with its name, whether it may drive the robot now; the error is
+  the name of the client that does.
+  """
+  @spec run(:gen_tcp.socket(), %{
+          required(:robot) => atom(),
+          required(:page) => map(),
+          required(:claim) => (who :: String.t() -> :ok | {:error, who :: String.t()}),
+          optional(atom()) => term()
+        }) :: no_return()
+  def run(socket, %{robot: robot, claim: claim, page: page}) do
     {:ok, {address, port}} = ok!(:inet.sockname(socket))
     {:ok, {peer, from}} = ok!(:inet.peername(socket))
     who = "player #{:inet.ntoa(peer)}:#{from}"
@@ -40,7 +48,7 @@ defmodule Player.Connection do
     s = %{
       socket: socket,
       robot: robot,
-      door: door,
+      claim: claim,
       page: page,
       who: who,
       hub: hub,
@@ -155,7 +163,7 @@ defmodule Player.Connection do
   defp effect({:drive, ahead, left}, s) do
     given_us = System.monotonic_time(:microsecond)
 
-    case Door.claim(s.door, s.robot, s.who) do
+    case s.claim.(s.who) do
       :ok ->
         order = Orders.of_speed(s.robot, {ahead, left}, @drive_ms, s.source, given_us)
         Orders.give(s.orders, order)

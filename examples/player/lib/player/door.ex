@@ -31,10 +31,6 @@ defmodule Player.Door do
           GenServer.on_start()
   def start_link(options), do: GenServer.start_link(__MODULE__, options)
 
-  @doc "The calling client wants to drive this robot; the error is who drives it."
-  @spec claim(pid(), atom(), who :: String.t()) :: :ok | {:error, who :: String.t()}
-  def claim(door, robot, who), do: GenServer.call(door, {:claim, robot, who})
-
   @doc """
   The port of each robot: those that have one keep it, and the others follow in the order of their names.
 
@@ -150,7 +146,9 @@ defmodule Player.Door do
   end
 
   defp acceptor(s, robot) do
-    at = %{robot: robot, listen: s.listens[robot], door: self(), page: s.page}
+    door = self()
+    claim = &GenServer.call(door, {:claim, robot, &1})
+    at = %{robot: robot, listen: s.listens[robot], door: door, page: s.page, claim: claim}
     pid = :proc_lib.spawn_link(__MODULE__, :accept, [at])
     put_in(s.acceptors[pid], robot)
   end

@@ -26,11 +26,6 @@ defmodule Console.Page.Service do
 
   @optional_callbacks answer: 2, door: 1
 
-  @doc "Whether a service listens by itself."
-  @spec own_door?(module() | nil) :: boolean()
-  def own_door?(service),
-    do: service != nil and Code.ensure_loaded?(service) and function_exported?(service, :door, 1)
-
   @doc "The services of this build: name, port and module."
   @spec all() :: [{atom(), {:inet.port_number(), module()}}]
   def all, do: Application.get_env(:console, :services, [])
