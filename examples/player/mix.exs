@@ -11,8 +11,9 @@ defmodule Player.MixProject do
       version: "0.1.0",
       elixir: "~> 1.14",
       build_path: Path.join(@convoy, "_build"),
+      config_path: Path.join(@convoy, "config/config.exs"),
       start_permanent: Mix.env() == :prod,
-      deps: [{:robot, path: Path.join(@convoy, "apps/robot"), env: Mix.env()}]
+      deps: [{:bridge, path: Path.join(@convoy, "apps/bridge"), env: Mix.env()}]
     ]
   end
 

@@ -142,6 +142,10 @@ defmodule Docs.Checks do
     "-pa _build/dev/lib/hal/ebin _build/dev/lib/mesh/ebin",
     # Programs in Python; apps/bridge tries them where roslibpy is.
     "pip install roslibpy",
+    # Programs of users of Player; examples/player tests the server, which is built along by hand.
+    "ln -s ../examples/player apps/player",
+    "#include <libplayerc/playerc.h>",
+    "from playerc import *",
     # What programs print that are not run here.
     "Active: active (running)",
     "27.6 s  wheels 0.20 m/s",

@@ -22,8 +22,8 @@ defmodule Bridge.Catalogue do
   @callback scene(Broker.key(), ns :: non_neg_integer(), Scene.t(), Drawing.paths()) ::
               iodata() | nil
 
-  @doc "What is known of a robot (`Console.About`), as one of its topics says it."
-  @callback about(Broker.key(), ns :: non_neg_integer(), map()) :: iodata()
+  @doc "What is known of a robot (`Console.About`), as one of its topics says it; `nil` if it says nothing."
+  @callback about(Broker.key(), ns :: non_neg_integer(), map()) :: iodata() | nil
 
   @doc "The topics of the log."
   @callback log() :: [Broker.key()]

@@ -207,18 +207,8 @@ defmodule Bridge.Connection do
   end
 
   defp effect({:drive, robot, ahead, left}, s) do
-    {module, live} = s.source
-
-    Orders.give(s.orders, %{
-      kind: {:word, robot, @drive_ms},
-      key: robot,
-      line: "drive",
-      given_us: System.monotonic_time(:microsecond),
-      run: fn age_ms ->
-        for_s = max(@drive_ms - age_ms, 0) / 1_000
-        module.command(live, {:tell, [robot], {:move, ahead, left, for_s}})
-      end
-    })
+    given_us = System.monotonic_time(:microsecond)
+    Orders.give(s.orders, Orders.of_speed(robot, {ahead, left}, @drive_ms, s.source, given_us))
 
     now_ms = Hal.Clock.now_ms()
     before_ms = s.drives[robot]

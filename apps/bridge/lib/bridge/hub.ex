@@ -125,13 +125,13 @@ defmodule Bridge.Hub do
     {:noreply, s |> question(asking, now_ms) |> serve() |> Map.put(:ticking?, false) |> tick()}
   end
 
-  def handle_info({ref, abouts}, %{asked: ref} = s) do
+  # Said as of the tick that asked, else what is due at each tick would be at each other one.
+  def handle_info({ref, abouts}, %{asked: {ref, asked_ms}} = s) do
     Process.demonitor(ref, [:flush])
-    now_ms = Hal.Clock.now_ms()
 
     s =
       for {key, about} <- abouts, reduce: s do
-        s -> say(s, key, s.catalogue.about(key, ns(), about), now_ms)
+        s -> say(s, key, s.catalogue.about(key, ns(), about), asked_ms)
       end
 
     {:noreply, serve(%{s | asked: nil})}
@@ -189,7 +189,7 @@ defmodule Bridge.Hub do
 
   # The next question waits for the answer to this one.
   defp question(s, [], _now_ms), do: s
-  defp question(%{asked: ref} = s, _keys, _now_ms) when ref != nil, do: s
+  defp question(%{asked: asked} = s, _keys, _now_ms) when asked != nil, do: s
 
   defp question(s, keys, now_ms) do
     {module, live, catalogue} = {s.module, s.live, s.catalogue}
@@ -204,7 +204,7 @@ defmodule Bridge.Hub do
       end)
 
     broker = Enum.reduce(keys, s.broker, &Broker.say(&2, &1, nil, now_ms))
-    %{s | asked: task.ref, broker: broker}
+    %{s | asked: {task.ref, now_ms}, broker: broker}
   end
 
   defp serve(s) do

@@ -10,7 +10,19 @@ defmodule Bridge.RosbridgeTest do
 
   @examples Path.expand("../../../../examples/python", __DIR__)
 
-  defp serve do
+  # A fleet whose robots take some ms to answer.
+  defmodule Slow do
+    defdelegate scene(live), to: FakeLive
+
+    def about(live, robot) do
+      receive do
+      after
+        5 -> FakeLive.about(live, robot)
+      end
+    end
+  end
+
+  defp serve(module \\ FakeLive) do
     {:ok, map} = Sim.Floorplan.open("hospital", 2)
     robots = [{:mag1, {1.0, 2.0}, []}, {:mag2, {3.0, 2.0}, []}]
     {:ok, live} = FakeLive.start_link(FakeLive.of(robots, map: map))
@@ -25,7 +37,7 @@ defmodule Bridge.RosbridgeTest do
     })
 
     {:ok, _page, url} =
-      Page.start_link(module: FakeLive, live: live, robots: [:mag1, :mag2], service: Rosbridge)
+      Page.start_link(module: module, live: live, robots: [:mag1, :mag2], service: Rosbridge)
 
     %{live: live, url: url}
   end
@@ -97,6 +109,21 @@ defmodule Bridge.RosbridgeTest do
 
     assert {%{"voltage" => 13.5, "percentage" => nil}, _client} =
              published(client, "/mag1/battery_state")
+  end
+
+  test "says odometry at each tick, twice as often as what is due at each other one" do
+    %{url: url} = serve(Slow)
+    client = open(url)
+    client = say(client, %{op: "subscribe", topic: "/tf"})
+    client = say(client, %{op: "subscribe", topic: "/mag1/odom"})
+
+    {topics, _client} =
+      Enum.map_reduce(1..30, client, fn _nth, client ->
+        await(client, fn {1, text} -> elem(Bridge.Json.decode(text), 1)["topic"] end)
+      end)
+
+    counts = Enum.frequencies(topics)
+    assert counts["/mag1/odom"] > 1.5 * counts["/tf"]
   end
 
   test "makes one stream of what a client asks twice, as rarely as it wants, as CBOR if it wants that" do

@@ -77,6 +77,33 @@ defmodule Console.Orders do
     }
   end
 
+  @doc """
+  The order of a word of driving with speeds: ahead in m/s, to the left in rad/s; it lasts `longest_ms` from when it was given.
+
+      iex> live = {Console.Orders, nil}
+      iex> Console.Orders.of_speed(:mag1, {0.2, 0.0}, 500, live, 0).kind
+      {:word, :mag1, 500}
+  """
+  @spec of_speed(
+          atom(),
+          {ahead :: float(), left :: float()},
+          longest_ms :: pos_integer(),
+          {module(), live :: term()},
+          given_us :: integer()
+        ) :: order()
+  def of_speed(robot, {ahead, left}, longest_ms, {module, live}, given_us) do
+    %{
+      kind: {:word, robot, longest_ms},
+      key: robot,
+      line: "drive",
+      given_us: given_us,
+      run: fn age_ms ->
+        for_s = max(longest_ms - age_ms, 0) / 1_000
+        module.command(live, {:tell, [robot], {:move, ahead, left, for_s}})
+      end
+    }
+  end
+
   @doc "That a person was heard then, for robots that move only in the presence of one."
   @spec of_presence(given_us :: integer()) :: order()
   def of_presence(given_us) do

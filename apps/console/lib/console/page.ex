@@ -50,6 +50,7 @@ defmodule Console.Page do
 
     with :ok <- server(),
          :ok <- guarded(options),
+         :ok <- reached(options),
          {:ok, port} <- free(options),
          {:ok, page} <- Supervisor.start_link(__MODULE__, %{options | port: port}) do
       {:ok, page, url(options.service, options.address, port)}
@@ -86,6 +87,18 @@ defmodule Console.Page do
 
   defp guarded(_with_a_token), do: :ok
 
+  # A client of a door of its own knows no token.
+  defp reached(%{service: service, address: address}) do
+    if own_door?(service) and not Page.Access.loopback?(address),
+      do:
+        {:error,
+         "its programs cannot say a token: it is served on this machine alone (ssh -L brings a port of it elsewhere)"},
+      else: :ok
+  end
+
+  defp own_door?(service),
+    do: service != nil and Code.ensure_loaded?(service) and function_exported?(service, :door, 1)
+
   # Any that is free is chosen once: a door that was restarted must be where the open pages look for it.
   defp free(%{address: address, port: port}) do
     case :gen_tcp.listen(port, ip: address, reuseaddr: true) do
@@ -111,7 +124,13 @@ defmodule Console.Page do
       |> Map.merge(%{robots: robots, page: self(), session: session})
       |> Map.put(:answer, options.service || Request)
 
-    door = {Door, options |> Map.take([:address, :port]) |> Map.put(:page, page)}
+    at = options |> Map.take([:address, :port]) |> Map.put(:page, page)
+
+    door =
+      if own_door?(options.service),
+        do: options.service.door(at),
+        else: {Door, at}
+
     source = Map.take(options, [:module, :live])
 
     feed =

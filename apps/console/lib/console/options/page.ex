@@ -28,7 +28,9 @@ defmodule Console.Options.Page do
   @spec services() :: [Hal.Cli.Arguments.option()]
   def services do
     for {name, {port, _module}} <- Page.Service.all(),
-        do: {"#{name}", "[PORT]", &or_else(&1, port), "#{@about[name]} (#{port})"}
+        do:
+          {"#{name}", "[PORT]", &or_else(&1, port),
+           "#{@about[name] || "serve #{name} at this port"} (#{port})"}
   end
 
   defp or_else("", port), do: {:ok, port}

@@ -17,6 +17,15 @@ defmodule Console.Page.Service do
   @doc "Answers a request, in the process of its connection (`Console.Page.Http`)."
   @callback answer(Page.Http.request(), page :: map()) :: term()
 
+  @doc """
+  What listens in the place of the page's own door (`Console.Page.Door`, whose options it gets), for programs that speak no HTTP. These
+  cannot say the page's token, so they are served on this machine alone.
+  """
+  @callback door(%{address: :inet.ip_address(), port: :inet.port_number(), page: map()}) ::
+              Supervisor.child_spec()
+
+  @optional_callbacks answer: 2, door: 1
+
   @doc "The services of this build: name, port and module."
   @spec all() :: [{atom(), {:inet.port_number(), module()}}]
   def all, do: Application.get_env(:console, :services, [])
