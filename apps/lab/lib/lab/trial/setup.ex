@@ -33,15 +33,15 @@ defmodule Lab.Trial.Setup do
 
   @doc """
   A setup. Options (a keyword list or a map; all have defaults): `robots` (ids), `bodies` (`Lab.Trial.Options.bodies/2`), `seed`,
-  `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
+  `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread`, `:same`, or a pose for each robot, `[{x, y, degrees}]`), `world` (a file of Stage's instead of `robots`, `bodies`, `map` and `start`: `Lab.Trial.WorldFile`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Lab.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Lab.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
   in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}], known: :all]`; `known` are those of
-  which they are told where they hang, `[]` by default), `balls` (`[{x, y}]`) and `boxes`
-  (`[{x, y, degrees}]`) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  which they are told where they hang, `[]` by default), `balls` (`[{x, y}]`, or with a radius) and `boxes`
+  (`[{x, y, degrees}]`, or with length and width) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -164,12 +164,17 @@ defmodule Lab.Trial.Setup do
 
   defp objects(options) do
     balls =
-      for {{x, y}, n} <- Enum.with_index(options.balls, 1),
-          do: [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)]
+      for {ball, n} <- Enum.with_index(options.balls, 1) do
+        [x, y | radius] = Tuple.to_list(ball)
+        [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)] ++ Enum.zip([:radius], radius)
+      end
 
     boxes =
-      for {{x, y, degrees}, n} <- Enum.with_index(options.boxes, 1),
-          do: [id: "box#{n}", kind: :box, pose: Pose.new(x, y, degrees * :math.pi() / 180)]
+      for {box, n} <- Enum.with_index(options.boxes, 1) do
+        [x, y, degrees | sides] = Tuple.to_list(box)
+        pose = Pose.new(x, y, degrees * :math.pi() / 180)
+        [id: "box#{n}", kind: :box, pose: pose] ++ Enum.zip([:length, :width], sides)
+      end
 
     Enum.map(balls ++ boxes, &Object.new!/1)
   end
@@ -182,6 +187,15 @@ defmodule Lab.Trial.Setup do
         at([if(kind == :ball, do: "balls", else: "boxes"), n], {:error, line})
       end
     end)
+  end
+
+  # Poses that are given are taken.
+  defp places(map, bodies, %{start: [_ | _] = given} = options, landmark) do
+    starts = for {x, y, degrees} <- given, do: Pose.new(x, y, degrees * :math.pi() / 180)
+
+    with {:ok, landmark, _starts} <- landmark_beside(map, bodies, options, landmark),
+         :ok <- check_starts(map, Enum.zip(bodies, starts), objects(options), landmark),
+         do: {:ok, landmark, starts}
   end
 
   # Of the starts that further seeds give, the first at which no robot stands on an object.
@@ -198,6 +212,40 @@ defmodule Lab.Trial.Setup do
         if draw == @draws or not Enum.any?(Enum.zip(bodies, starts), stands?), do: places
       end
     end)
+  end
+
+  defp landmark_beside(map, bodies, options, :default),
+    do: Sim.Floorplan.places(map, bodies, options.seed, :default)
+
+  defp landmark_beside(_map, _bodies, _options, landmark), do: {:ok, landmark, nil}
+
+  defp check_starts(map, robots, objects, landmark) do
+    pole =
+      if landmark, do: [{"the landmark", landmark, Sim.Floorplan.Landmark.radius()}], else: []
+
+    robots
+    |> Enum.reduce_while(pole, fn {{id, radius}, %{x: x, y: y}}, standing ->
+      there =
+        Enum.find_value(standing, fn {name, place, other} ->
+          if Pose.distance(place, {x, y}) < radius + other, do: name
+        end) ||
+          Enum.find_value(objects, &if(elem(Object.gap(&1, {x, y, radius}), 0) < 0.0, do: &1.id))
+
+      cond do
+        there ->
+          {:halt, "#{id} cannot start at #{x},#{y} of map #{map.name}: #{there} is there"}
+
+        not Sim.Floorplan.free?(map, {x, y}, radius) ->
+          {:halt, "#{id} cannot start at #{x},#{y} of map #{map.name}: there is a wall"}
+
+        true ->
+          {:cont, [{id, {x, y}, radius} | standing]}
+      end
+    end)
+    |> case do
+      line when is_binary(line) -> {:error, line}
+      _standing -> :ok
+    end
   end
 
   # Places that a script names, which depend on the map.
