@@ -4,15 +4,9 @@ defmodule Lab.Trial.Setup do
   configuration. Pure; the trial and the live fleet both use it.
   """
   alias Hal.{Pose, Profile}
-  alias Lab.Trial.Options
+  alias Lab.Trial.{Options, Places}
   alias Sim.World
-  alias Sim.World.Object
   alias Vision.Marks
-
-  # How often starts are drawn again, and how far from objects they must be.
-  @draws 50
-  @next_seed 1_000_003
-  @beside 0.1
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys ++ [plan: nil]
@@ -76,13 +70,13 @@ defmodule Lab.Trial.Setup do
 
     with {:ok, map} <-
            at(["map"], Sim.Floorplan.open(options.map, length(options.robots), options.grey)),
-         :ok <- at(["landmark"], check_landmarks(map, asked)),
-         :ok <- at(["moves"], check_landmarks(map, moves)),
+         :ok <- at(["landmark"], Places.check_landmarks(map, asked)),
+         :ok <- at(["moves"], Places.check_landmarks(map, moves)),
          :ok <- at(["marks"], check_marks(options)),
-         :ok <- check_objects(map, objects(options)),
-         :ok <- check_script(map, options),
+         :ok <- Places.check_objects(map, Places.objects(options)),
+         :ok <- Places.check_script(map, options),
          {:ok, landmark, starts} <-
-           at(["map"], places(map, bodies, options, landmark)) do
+           at(["map"], Places.choose(map, bodies, options, landmark)) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
   end
@@ -105,17 +99,6 @@ defmodule Lab.Trial.Setup do
           seed: options.seed,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
-  end
-
-  @doc "Checks that the landmark can stand at all these places (`nil`: no landmark)."
-  @spec check_landmarks(Sim.Floorplan.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
-  def check_landmarks(map, places) do
-    Enum.find_value(places, :ok, fn place ->
-      case place && Sim.Floorplan.check_landmark(map, place) do
-        {:error, line} -> {:error, line}
-        _fine -> nil
-      end
-    end)
   end
 
   @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
@@ -162,118 +145,6 @@ defmodule Lab.Trial.Setup do
       for({id, robot} <- Keyword.get(marks, :robots, []), do: [id: id, robot: robot] ++ alike)
   end
 
-  defp objects(options) do
-    balls =
-      for {ball, n} <- Enum.with_index(options.balls, 1) do
-        [x, y | radius] = Tuple.to_list(ball)
-        [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)] ++ Enum.zip([:radius], radius)
-      end
-
-    boxes =
-      for {box, n} <- Enum.with_index(options.boxes, 1) do
-        [x, y, degrees | sides] = Tuple.to_list(box)
-        pose = Pose.new(x, y, degrees * :math.pi() / 180)
-        [id: "box#{n}", kind: :box, pose: pose] ++ Enum.zip([:length, :width], sides)
-      end
-
-    Enum.map(balls ++ boxes, &Object.new!/1)
-  end
-
-  defp check_objects(map, objects) do
-    Enum.find_value(objects, :ok, fn %{id: id, kind: kind, pose: pose} = object ->
-      unless Object.free?(object, map) do
-        n = String.replace_prefix(id, "#{kind}", "")
-        line = "#{id} cannot be at #{pose.x},#{pose.y} of map #{map.name}: there is a wall"
-        at([if(kind == :ball, do: "balls", else: "boxes"), n], {:error, line})
-      end
-    end)
-  end
-
-  # Poses that are given are taken.
-  defp places(map, bodies, %{start: [_ | _] = given} = options, landmark) do
-    starts = for {x, y, degrees} <- given, do: Pose.new(x, y, degrees * :math.pi() / 180)
-
-    with {:ok, landmark, _starts} <- landmark_beside(map, bodies, options, landmark),
-         :ok <- check_starts(map, Enum.zip(bodies, starts), objects(options), landmark),
-         do: {:ok, landmark, starts}
-  end
-
-  # Of the starts that further seeds give, the first at which no robot stands on an object.
-  defp places(map, bodies, %{seed: seed} = options, landmark) do
-    objects = objects(options)
-
-    Enum.find_value(0..@draws, fn draw ->
-      with {:ok, _landmark, starts} = places <-
-             Sim.Floorplan.places(map, bodies, seed + draw * @next_seed, landmark) do
-        stands? = fn {{_id, radius}, %{x: x, y: y}} ->
-          Enum.any?(objects, &(elem(Object.gap(&1, {x, y, radius}), 0) < @beside))
-        end
-
-        if draw == @draws or not Enum.any?(Enum.zip(bodies, starts), stands?), do: places
-      end
-    end)
-  end
-
-  defp landmark_beside(map, bodies, options, :default),
-    do: Sim.Floorplan.places(map, bodies, options.seed, :default)
-
-  defp landmark_beside(_map, _bodies, _options, landmark), do: {:ok, landmark, nil}
-
-  defp check_starts(map, robots, objects, landmark) do
-    pole =
-      if landmark, do: [{"the landmark", landmark, Sim.Floorplan.Landmark.radius()}], else: []
-
-    robots
-    |> Enum.reduce_while(pole, fn {{id, radius}, %{x: x, y: y}}, standing ->
-      there =
-        Enum.find_value(standing, fn {name, place, other} ->
-          if Pose.distance(place, {x, y}) < radius + other, do: name
-        end) ||
-          Enum.find_value(objects, &if(elem(Object.gap(&1, {x, y, radius}), 0) < 0.0, do: &1.id))
-
-      cond do
-        there ->
-          {:halt, "#{id} cannot start at #{x},#{y} of map #{map.name}: #{there} is there"}
-
-        not Sim.Floorplan.free?(map, {x, y}, radius) ->
-          {:halt, "#{id} cannot start at #{x},#{y} of map #{map.name}: there is a wall"}
-
-        true ->
-          {:cont, [{id, {x, y}, radius} | standing]}
-      end
-    end)
-    |> case do
-      line when is_binary(line) -> {:error, line}
-      _standing -> :ok
-    end
-  end
-
-  # Places that a script names, which depend on the map.
-  defp check_script(map, options) do
-    options.script
-    |> Enum.with_index(1)
-    |> Enum.find_value(:ok, fn {{_at_s, event}, n} ->
-      with {:error, _line} = error <- check_event(map, event, options.bodies),
-           do: at(["script", "#{n}"], error),
-           else: (_fine -> nil)
-    end)
-  end
-
-  defp check_event(map, {:move, place}, _bodies), do: check_landmarks(map, [place])
-
-  defp check_event(map, {:displace, who, {x, y, _deg}}, bodies),
-    do: check_place(map, who, {x, y}, bodies)
-
-  defp check_event(_map, _event, _bodies), do: :ok
-
-  defp check_place(map, who, {x, y} = place, bodies) do
-    ids = if who == :leader, do: Map.keys(bodies), else: [who]
-    radius = ids |> Enum.map(&bodies[&1].radius) |> Enum.max()
-
-    unless Sim.Floorplan.free?(map, place, radius),
-      do: {:error, "#{who} cannot be put at #{x},#{y} of map #{map.name}: there is a wall"}
-  end
-
   defp build(options, map, robots, landmark) do
     common = common_start(options, robots)
 
@@ -284,7 +155,7 @@ defmodule Lab.Trial.Setup do
         noise: options.noise,
         landmark: landmark,
         marks: hung(options.marks),
-        objects: objects(options),
+        objects: Places.objects(options),
         robots:
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)

@@ -21,7 +21,8 @@ defmodule Lab.Trial.WorldFileTest do
     assert trial.world.landmark == {0.5, 0.0}
     assert [%{id: "ball1", size: 0.11}, %{id: "box1", size: {0.8, 0.5}}] = trial.world.objects
     assert_in_delta trial.world.robots.r1.pose.heading, -20 * :math.pi() / 180, 1.0e-9
-    assert %{about: "a rover", radius: 0.2, bumpers: 16} = trial.world.robots.r0.profile
+    assert %{about: "a rover", radius: radius, bumpers: 16} = trial.world.robots.r0.profile
+    assert_in_delta radius, 0.2, 0.001
     assert length(trial.world.robots.r0.profile.sonars) == 8
 
     trial = trial |> Stream.iterate(&Trial.step/1) |> Enum.find(&Trial.done?/1)
