@@ -43,6 +43,7 @@ defmodule Docs.Checks do
     "bin/demo --nodes --robots 4" => @live,
     "bin/demo --map floor.png:16x12 --landmark 2,1" => @live,
     "bin/demo --map building.yaml" => @live,
+    "bin/demo --world examples/stage/yard.world" => @live,
     "bin/demo --headless --map hospital.png:110x42 --robots 5" => @drawing,
     "bin/console --page-address 0.0.0.0 --page-token-file page.token" => @live,
     "bin/demo --hardware 1" => @live,

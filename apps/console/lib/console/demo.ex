@@ -148,7 +148,7 @@ defmodule Console.Demo do
   def heading(options, scene) do
     "#{Format.count(length(options.robots), "robot")} (#{Fleet.describe(options.robots)}) in " <>
       "#{options.map}#{MapName.grey(scene, "--grey floor")}, seed #{options.seed}, " <>
-      task(options, scene) <> places(options, scene) <> unseeing(options.robots)
+      task(options, scene) <> places(options, scene) <> unseeing(options)
   end
 
   defp task(%{mission: {module, _own}}, _scene) when module != Missions.Landmark,
@@ -169,8 +169,8 @@ defmodule Console.Demo do
       )
   end
 
-  defp unseeing(robots) do
-    {:ok, bodies} = Lab.Trial.Options.bodies(robots, [])
+  defp unseeing(%{robots: robots, bodies: bodies}) do
+    {:ok, bodies} = Lab.Trial.Options.bodies(robots, bodies)
     kinds = robots |> Enum.map(&bodies[&1]) |> Enum.uniq()
     for body <- kinds, line = Robot.File.Warnings.blind(body), into: "", do: "; #{line}"
   end

@@ -12,6 +12,7 @@ defmodule Console.Live do
           {:kill, :leader | atom()}
           | {:formation, {atom(), float() | nil}}
           | {:landmark, Pose.point() | :none}
+          | {:place, (robot :: atom()) | (object :: String.t()), Pose.point()}
           | {:tell, target(), Robot.Command.t() | {:replace, mission :: String.t()}}
           | :estop
           | :reset
@@ -24,10 +25,10 @@ defmodule Console.Live do
   @callback command(live :: term(), command()) :: {:ok, String.t()} | {:error, String.t()}
 
   @typedoc """
-  What only some fleets can do: simulated ones kill a robot and move the landmark; real ones are armed and disarmed. A recording
+  What only some fleets can do: simulated ones kill a robot, move the landmark, and put robots, balls and boxes elsewhere; real ones are armed and disarmed. A recording
   is shown at any time of its run, and takes no orders (`:replay`).
   """
-  @type offer :: :kill | :landmark | :arm | :replay
+  @type offer :: :kill | :landmark | :place | :arm | :replay
 
   @doc "How fast it goes; `nil` for one that goes by the real clock."
   @callback pace(live :: term()) :: Console.Pace.t() | nil

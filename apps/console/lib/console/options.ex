@@ -9,12 +9,16 @@ defmodule Console.Options do
   alias Hal.Cli.Parse
   alias Console.Pace
   alias Hal.Options.Suggest
+  alias Lab.Trial.WorldFile
   alias Sim.Floorplan.Maps
   alias Swarm.MissionRegistry
 
   defstruct robots: nil,
             seed: 1,
             map: "hall",
+            bodies: [],
+            marks: nil,
+            world: nil,
             grey: :wall,
             start: :spread,
             landmark: :default,
@@ -121,6 +125,7 @@ defmodule Console.Options do
     |> Map.take(
       ~w(robots seed map grey start landmark balls boxes moves kills loss noise formation assign leader_change blobs hardware)a
     )
+    |> Map.merge(if options.world, do: Map.take(options, [:bodies, :marks]), else: %{})
     |> Map.put(:plan, plan(options))
     |> Map.put(:duration_s, duration_s(options))
     |> Map.merge(if options.mission, do: %{mission: options.mission}, else: %{})
@@ -160,6 +165,8 @@ defmodule Console.Options do
        "of all randomness; the same seed gives the same run (1)"},
       {"map", "NAME", &MapName.parse(&1, folder),
        "#{MapName.names()},\nor FILE.yaml, or FILE.png:WIDTHxHEIGHT (or FILE.pgm) in metres (hall)"},
+      {"world", "FILE.world", &world(&1, folder),
+       "or walls, robots, landmark, balls and boxes of a world of Stage\n(instead of --map, --robots, --fleet and --start)"},
       {"grey", "HOW", &Parse.choice(&1, wall: :wall, floor: :floor),
        "what the grey of a picture is that seems to stand for what is unknown:\nwall, floor (wall)"},
       {"plan", "HOW", &Parse.choice(&1, none: :none, known: :known, sonar: :sonar),
@@ -222,6 +229,7 @@ a fault or a crash, and at keep (not with --nodes)"},
   end
 
   defp put({"fleet", _robots}, options), do: options
+  defp put({"world", _file}, options), do: options
   defp put({"robots", _count}, options), do: options
   defp put({"move", move}, options), do: %{options | moves: options.moves ++ [move]}
   defp put({"ball", place}, options), do: %{options | balls: options.balls ++ [place]}
@@ -240,6 +248,24 @@ a fault or a crash, and at keep (not with --nodes)"},
   end
 
   defp fleet(pairs) do
+    case List.keyfind(pairs, "world", 0) do
+      {_, file} -> world_fleet(file, pairs)
+      nil -> named_fleet(pairs)
+    end
+  end
+
+  # What the world's file says is there first, and other options change it or come to it.
+  defp world_fleet(file, pairs) do
+    with nil <- Enum.find(~w(robots fleet map start), &List.keymember?(pairs, &1, 0)),
+         {:ok, world} <- WorldFile.open(file) do
+      {:ok, struct!(%__MODULE__{world: world}, world.options)}
+    else
+      {:error, line} -> {:error, ["--world: #{line}"]}
+      name -> {:error, ["--world and --#{name} exclude each other: the file says it itself"]}
+    end
+  end
+
+  defp named_fleet(pairs) do
     case {List.keyfind(pairs, "robots", 0), List.keyfind(pairs, "fleet", 0)} do
       {{_, _}, {_, _}} -> {:error, ["--robots and --fleet exclude each other; give one of them"]}
       {_, {_, robots}} -> {:ok, %__MODULE__{robots: robots}}
@@ -382,6 +408,12 @@ a fault or a crash, and at keep (not with --nodes)"},
   defp pictures(text) do
     {lowest, highest} = Lab.Recording.Pictures.rates()
     Parse.number(text, lowest, highest)
+  end
+
+  defp world(text, folder) do
+    if text =~ ~r/.\.world\z/i,
+      do: {:ok, MapName.from(text, folder)},
+      else: {:error, "FILE.world"}
   end
 
   defp landmark("none"), do: {:ok, :none}

@@ -12,7 +12,8 @@ defmodule Console.Prompt do
   alias Robot.Command
   alias Swarm.{BehaviourRegistry, MissionRegistry}
 
-  @words ~w(kill formation landmark move goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
+  @object ~r/\A(ball|box)\d{1,4}\z/
+  @words ~w(kill formation landmark move place goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -151,14 +152,14 @@ defmodule Console.Prompt do
       ["replace"] -> MissionRegistry.names() ++ ["all" | names]
       ["replace", name] -> if name in ["all" | names], do: MissionRegistry.names(), else: []
       ["gamepad"] -> ["off" | names]
-      [word] when word in ["goto", "follow", "drive", "stop", "status"] -> names
+      [word] when word in ["place", "goto", "follow", "drive", "stop", "status"] -> names
       _other -> []
     end
   end
 
   @doc "The help, one command a line; of what only some fleets can do, what this one offers."
   @spec help([Console.Live.offer()]) :: [String.t()]
-  def help(offers \\ [:kill, :landmark]) do
+  def help(offers \\ [:kill, :landmark, :place]) do
     when_offered = fn offer, lines -> if offer in offers, do: lines, else: [] end
 
     when_offered.(:kill, ["kill leader, kill mag2        that robot dies"]) ++
@@ -168,6 +169,9 @@ defmodule Console.Prompt do
       ] ++
       when_offered.(:landmark, [
         "landmark 3,2, landmark none   the landmark glides there, or is removed"
+      ]) ++
+      when_offered.(:place, [
+        "place mag2 1,2, place ball1 2,0   a robot, a ball or a box is put there"
       ]) ++
       [
         "goto mag2 1,2                 one robot drives to a place",
@@ -234,6 +238,15 @@ defmodule Console.Prompt do
 
   defp command(word, rest, _robots) when word in ["landmark", "move"],
     do: with_point(rest, word <> " X,Y", &{:landmark, &1})
+
+  # Whether there is an object of this name, the fleet knows.
+  defp command("place", [name | rest], robots) when rest != [] do
+    with {:ok, who} <- if(name =~ @object, do: {:ok, name}, else: robot(name, robots)),
+         do: with_point(rest, "place NAME X,Y", &{:place, who, &1})
+  end
+
+  defp command("place", _rest, _robots),
+    do: {:error, "place needs a name and a place: place mag1 1,2, place ball1 1,2"}
 
   defp command("goto", [name | rest], robots) when rest != [] do
     with {:ok, robot} <- robot(name, robots) do

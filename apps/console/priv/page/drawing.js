@@ -27,6 +27,7 @@ export function paint(floor, colour) {
     const mark = floor.moving ?? scene.landmark;
     if (mark) triangle(c, ...view.toPixel(...mark));
     for (const [r, hue] of placed) body(c, view, r, hue, r.id === floor.chosen);
+    if (floor.lifted) lifted(c, floor, colour);
     labels(c, view, placed.map(([r]) => r), mark);
   }
   scale(c, view);
@@ -322,6 +323,24 @@ export function thing(c, view, { at, r, box }) {
   c.closePath();
   c.fill();
   c.stroke();
+}
+
+// What is dragged, over the place where it would be put.
+function lifted(c, { scene, lifted: { id, at }, view }, colour) {
+  const r = scene.robots.find((robot) => robot.id === id);
+  c.globalAlpha = 0.6;
+  if (r) {
+    const [x, y] = view.toPixel(...at);
+    c.fillStyle = colour(scene.robots.indexOf(r));
+    c.beginPath();
+    outline(c, r, x, y, Math.max(4, r.r * view.at.scale));
+    c.fill();
+  } else {
+    const object = scene.objects.find((o) => o.id === id);
+    const moved = ([x, y]) => [x + at[0] - object.at[0], y + at[1] - object.at[1]];
+    if (object) thing(c, view, { at, r: object.r, box: object.box.map(moved) });
+  }
+  c.globalAlpha = 1;
 }
 
 // Names above the robots, and below the landmark; on the other side where there is a name already.

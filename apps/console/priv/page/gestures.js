@@ -1,4 +1,4 @@
-// What pointers and keys do to the map: choose, send, drag the landmark, move the view, zoom with wheel or two fingers.
+// What pointers and keys do to the map: choose, send, drag the landmark and what can be lifted, move the view, zoom with wheel or two fingers.
 import { modified } from "./keys.js";
 
 const NEAR = 14; // pixels round what is pointed at
@@ -45,7 +45,11 @@ export class Gestures {
     const reach = e.pointerType === "touch" ? FINGER : NEAR;
     const near = ([x, y], within) => Math.hypot(px - x, py - y) < within;
     if (floor.movable() && near(floor.toPixel(...floor.scene.landmark), reach)) return { landmark: true };
-    return { robot: floor.here().find((r) => near(floor.toPixel(r.x, r.y), Math.max(reach, r.r * floor.view.at.scale))) };
+    const robot = floor.here().find((r) => near(floor.toPixel(r.x, r.y), Math.max(reach, r.r * floor.view.at.scale)));
+    if (!floor.map.offers.includes("place")) return { robot };
+    const half = ({ at, r, box }) => r ?? Math.min(...box.map((corner) => Math.hypot(corner[0] - at[0], corner[1] - at[1]))) / 2;
+    const object = floor.scene.objects.find((o) => near(floor.toPixel(...o.at), Math.max(reach, half(o) * floor.view.at.scale)));
+    return { robot, lifted: robot?.alive ? robot.id : object?.id };
   }
 
   // Only one pointer, and its main button, gives orders: a right click opens a menu, two fingers zoom, a long press sends.
@@ -55,9 +59,9 @@ export class Gestures {
     if (e.pointerType === "touch") this.fingers.set(e.pointerId, this.pixel(e));
     if (this.fingers.size === 2) return this.pinched();
     if (e.button !== 0 || !e.isPrimary) return;
-    const { landmark, robot } = this.at(e);
+    const { landmark, robot, lifted } = this.at(e);
     floor.canvas.setPointerCapture(e.pointerId);
-    this.dragged = { id: e.pointerId, from: this.pixel(e), place: this.toFloor(e), robot, landmark, moved: false };
+    this.dragged = { id: e.pointerId, from: this.pixel(e), place: this.toFloor(e), robot, landmark, lifted, moved: false };
     floor.moving = landmark ? this.toFloor(e) : null;
     if (e.pointerType === "touch" && !landmark) this.hold = setTimeout(() => this.held(), HOLD_MS);
   }
@@ -75,12 +79,14 @@ export class Gestures {
     if (this.pinch) return this.pinched();
     if (!floor.fit()) return;
     floor.on.point(this.toFloor(e));
-    if (!d) floor.canvas.className = this.at(e).landmark ? "grab" : "";
+    const over = d ? {} : this.at(e);
+    if (!d) floor.canvas.className = over.landmark || over.lifted ? "grab" : "";
     if (d?.id !== e.pointerId) return;
     if (e.buttons === 0) return this.abandon();
     const [px, py] = this.pixel(e);
     if (Math.hypot(px - d.from[0], py - d.from[1]) > STILL) d.moved = true;
     if (d.landmark) floor.moving = this.toFloor(e);
+    else if (d.lifted) floor.lifted = d.moved ? { id: d.lifted, at: this.toFloor(e) } : null;
     else if (d.moved && !floor.follow) floor.view.place(...d.place, floor.view.at.scale, px, py);
     if (d.moved) floor.canvas.className = "grabbing";
     floor.draw();
@@ -108,7 +114,7 @@ export class Gestures {
 
   abandon() {
     clearTimeout(this.hold);
-    this.dragged = this.floor.moving = null;
+    this.dragged = this.floor.moving = this.floor.lifted = null;
     this.floor.canvas.className = "";
     this.floor.draw();
   }
@@ -120,6 +126,7 @@ export class Gestures {
     this.abandon();
     const { on } = this.floor;
     if (d.landmark && d.moved) on.landmark(...this.toFloor(e));
+    else if (d.lifted && d.moved) on.place(d.lifted, ...this.toFloor(e));
     else if (d.robot) on.choose(d.robot.id);
     else if (!d.moved && !d.landmark) on.send(...this.toFloor(e));
   }

@@ -15,7 +15,7 @@ export const colour = (index) => COLOURS[index % COLOURS.length];
 export class FloorView {
   constructor(canvas, on) {
     this.canvas = canvas;
-    this.on = on; // {choose(id), send(x, y), landmark(x, y), point([x, y] or null)}
+    this.on = on; // {choose(id), send(x, y), landmark(x, y), place(id, x, y), point([x, y] or null)}
     this.map = null;
     this.scene = null;
     this.chosen = null;
@@ -25,6 +25,7 @@ export class FloorView {
     this.sonar = false;
     this.driving = false;
     this.moving = null; // where the landmark is dragged
+    this.lifted = null; // {id, at}: a robot, a ball or a box, and where it is dragged
     this.ghost = null; // {id, x, y}: where a robot is to go that has not said its way yet
     this.paths = new Map();
     this.frame = 0; // that of the robots that are drawn: where others are to these is not known

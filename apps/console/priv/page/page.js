@@ -25,13 +25,14 @@ const floor = window.floor = new FloorView(by("map"), {
   choose,
   send,
   landmark: (x, y) => say(`landmark ${x.toFixed(2)},${y.toFixed(2)}`),
+  place: (id, x, y) => say(`place ${id} ${x.toFixed(2)},${y.toFixed(2)}`),
   point: (place) => {
     by("coords").hidden = !place;
     if (place) write(by("coords"), `x ${place[0].toFixed(2)}  y ${place[1].toFixed(2)} m`);
   },
 });
 // The run beside this one, if a recording is compared with another.
-const other = new FloorView(by("beside"), { choose, send: () => {}, landmark: () => {}, point: () => {} });
+const other = new FloorView(by("beside"), { choose, send: () => {}, landmark: () => {}, place: () => {}, point: () => {} });
 const timeline = window.timeline = new Timeline({
   show,
   say,

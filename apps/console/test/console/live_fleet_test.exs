@@ -41,6 +41,11 @@ defmodule Console.LiveFleetTest do
 
     Swarm.Case.eventually(fn -> state.() == :wait end)
 
+    # A person lifts it.
+    pose = fn -> hd(Live.Fleet.scene(live).robots).pose end
+    assert {:ok, "done"} = Live.Fleet.command(live, {:place, :mag61, {-3.0, 3.0}})
+    Swarm.Case.eventually(fn -> Hal.Pose.distance(pose.(), {-3.0, 3.0}) < 0.5 end)
+
     assert {:ok, "done"} = Live.Fleet.command(live, {:kill, :mag61})
 
     # What a robot's processes log when they are cut off belongs to this test.
@@ -50,6 +55,9 @@ defmodule Console.LiveFleetTest do
     for command <- [
           {:kill, :leader},
           {:kill, :mag61},
+          {:place, :mag61, {0.0, 0.0}},
+          {:place, :min61, {500.0, 0.0}},
+          {:place, "ball1", {0.0, 0.0}},
           {:tell, [:mag61], :ping},
           {:tell, :all, "goto:abc:1"},
           {:tell, [:min61], {:goto, 99.0, 0.0, nil}},

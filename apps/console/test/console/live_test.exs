@@ -46,6 +46,14 @@ defmodule Console.LiveTest do
     assert {:error, "in lockstep no mission is replaced" <> _} =
              Live.Trial.command(live, {:tell, [:mag1], {:replace, "flock"}})
 
+    assert Live.Trial.command(live, {:place, :mag1, {99.0, 0.0}}) ==
+             {:error, "mag1 cannot be put at 99.0,0.0: there is no room"}
+
+    assert Live.Trial.command(live, {:place, "ball1", {0.0, 0.0}}) ==
+             {:error, "there is no ball1"}
+
+    assert {:ok, _done} = Live.Trial.command(live, {:place, :mag1, {3.0, 3.0}})
+
     assert tell.([:mag1], "square:2") == {:ok, "accepted"}
     assert %{state: :manual} = Enum.find(Live.Trial.scene(live).robots, &(&1.id == :mag1))
     assert Live.Trial.command(live, {:formation, {:wedge, 1.2}}) == {:ok, "accepted"}

@@ -119,6 +119,29 @@ defmodule Console.OptionsTest do
     assert Options.trial(options).duration_s == 120.0
   end
 
+  test "a world of Stage says map and robots; other options come to it" do
+    folder = Path.expand("../../../../examples/stage", __DIR__)
+
+    {:ok, options} =
+      Options.parse(~w(--world yard.world --ball -2,-3 --kill r2@9 --seed 4), folder)
+
+    trial = Options.trial(options)
+    assert trial.robots == [:r0, :r1, :r2, :rover1]
+    assert trial.map == Path.join(folder, "yard.world")
+    assert trial.landmark == {0.5, 0.0}
+    assert [{-4.5, -2.5, 0.11}, {-2.0, -3.0}] = trial.balls
+    assert trial.kills == [{:r2, 9.0}]
+    assert {:ok, _trial} = Lab.Trial.new(trial)
+    assert options.world.notes == [Path.join(folder, "yard.world") <> ":17: ctrl is left out"]
+
+    assert error("--world a.world --map hall") =~ "--world and --map exclude each other"
+    assert error("--world a.world --fleet mag:2") =~ "--world and --fleet exclude each other"
+    assert error("--world a.txt") =~ ~s(--world: expected FILE.world, got "a.txt")
+
+    assert error("--world no/such.world") =~
+             ~r/--world: .*no\/such.world: no such file or directory/
+  end
+
   test "a wrong value is named, with what is allowed" do
     for count <- ~w(0 -3 1e9 1001 six 6.5 99999999999999999999) do
       assert error("--robots #{count}") ==

@@ -165,6 +165,44 @@ defmodule Console.PageTest do
       Browser.close(browser)
     end
 
+    test "robots and balls are dragged in the simulation; where there is no room, they stay, and a line says so" do
+      world = Path.expand("../../../../examples/stage/yard.world", __DIR__)
+      {options, live} = trial("--world #{world} --mission teleop --blobs direct")
+      {_page, url} = page(options, Live.Trial, live)
+      browser = open(url)
+      Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 4")
+      Browser.run(browser, "document.querySelector('[data-fit=all]').click()")
+      Browser.await(browser, "return floor.view.at !== null && floor.scene.objects.length === 2")
+
+      drag = fn from, {x, y} ->
+        places = [from, {x - 0.5, y}, {x, y}]
+        Browser.drag(browser, Enum.map(places, &pixel(browser, &1)))
+      end
+
+      robot = "floor.scene.robots.find((r) => r.id === 'r1')"
+      drag.({-4.0, 0.0}, {-1.0, -2.5})
+      Browser.await(browser, "return Math.hypot(#{robot}.x + 1, #{robot}.y + 2.5) < 0.1")
+      drag.({-4.5, -2.5}, {-3.5, -3.0})
+      ball = "floor.scene.objects[0].at"
+      Browser.await(browser, "return Math.hypot(#{ball}[0] + 3.5, #{ball}[1] + 3) < 0.1")
+
+      # Onto the landmark.
+      drag.({-1.0, -2.5}, {0.5, 0.0})
+
+      Browser.await(
+        browser,
+        "return document.getElementById('answer').textContent.includes('there is no room')"
+      )
+
+      assert Browser.run(browser, "return Math.hypot(#{robot}.x + 1, #{robot}.y + 2.5) < 0.1")
+      # A click chooses it, as before.
+      {x, y} = pixel(browser, {-1.0, -2.5})
+      Browser.drag(browser, [{x, y}, {x, y}])
+      Browser.await(browser, "return window.floor.chosen === 'r1'")
+      assert Browser.errors(browser) == []
+      Browser.close(browser)
+    end
+
     test "of the chosen robot it shows all who wished, its way and what it did; and who leads" do
       for {line, module, start} <- [
             {"--robots 3 --seed 4 --blobs direct", Live.Trial, &slow/1},

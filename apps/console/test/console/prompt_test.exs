@@ -26,6 +26,8 @@ defmodule Console.PromptTest do
     assert ok("landmark -3, 2") == {:landmark, {-3.0, 2.0}}
     assert ok("move 3 2") == {:landmark, {3.0, 2.0}}
     assert ok("landmark none") == {:landmark, :none}
+    assert ok("place mag2 1,-2") == {:place, :mag2, {1.0, -2.0}}
+    assert ok("place ball1 0.5 2") == {:place, "ball1", {0.5, 2.0}}
     assert ok("goto mag2 1,2") == {:tell, [:mag2], {:goto, 1.0, 2.0, nil}}
     assert ok("follow min1 mag2") == {:tell, [:min1], {:follow_the_leader, :mag2}}
     assert ok("stop") == {:tell, :all, :stop}
@@ -166,6 +168,10 @@ defmodule Console.PromptTest do
     assert error("formation") =~ "needs a kind"
     assert error("landmark nan,1") =~ "X,Y in metres"
     assert error("landmark") =~ "X,Y in metres"
+    assert error("place") =~ "place mag1 1,2"
+    assert error("place mag1") =~ "place mag1 1,2"
+    assert error("place mag9 1,2") =~ "there are mag1 to mag2, min1"
+    assert error("place box1 1,here") =~ "X,Y in metres"
     assert error("goto mag1") =~ "goto mag1 1,2"
     assert error("goto mag1 inf,0") =~ "X,Y in metres"
     assert error("follow mag1 mag1") =~ "itself"

@@ -11,7 +11,7 @@ defmodule Lab.Fleet do
   alias Lab.Fleet.{Local, Mission, Nodes, PendingStages}
   alias Lab.{Messages, Moment}
   alias Sim.{Radio, Scene, World}
-  alias Lab.Trial.{Cuts, Evaluation, Event, Faults, RunLog, Script, Setup, Termination}
+  alias Lab.Trial.{Cuts, Evaluation, Event, Faults, Places, RunLog, Script, Setup, Termination}
   alias Swarm.Commands.Client
   alias Swarm.EStop.Broadcaster
 
@@ -90,6 +90,14 @@ defmodule Lab.Fleet do
   @spec move_landmark(GenServer.server(), Pose.point() | nil) ::
           :ok | {:error, line :: String.t()}
   def move_landmark(fleet, place), do: GenServer.call(fleet, {:move, place})
+
+  @doc """
+  Puts a robot that lives, or an object by its name, such as `"ball1"`, elsewhere, as a person who lifts it; its wheels do
+  not count that. The error says in one line why it cannot be there.
+  """
+  @spec place(GenServer.server(), atom() | String.t(), Pose.point()) ::
+          :ok | {:error, line :: String.t()}
+  def place(fleet, who, place), do: GenServer.call(fleet, {:place, {who, place}})
 
   @doc "What its robots have said to each other of late; the error says in one line why that is not known."
   @spec messages(GenServer.server()) :: {:ok, [Messages.entry()]} | {:error, line :: String.t()}
@@ -181,7 +189,7 @@ defmodule Lab.Fleet do
     do: {:reply, s |> run() |> Map.put(:script, s.script) |> Termination.reached?(), s}
 
   def handle_call({what, _which}, _from, %{ended: {line, _at_ms}} = s)
-      when what in [:kill, :move],
+      when what in [:kill, :move, :place],
       do: {:reply, {:error, "the run has ended: #{line}"}, s}
 
   def handle_call({:kill, :leader}, from, s) do
@@ -194,14 +202,25 @@ defmodule Lab.Fleet do
   def handle_call({:kill, id}, _from, s) do
     living = ask(s, :living)
 
-    if id in living,
-      do: {:reply, :ok, play({:kill, id}, s)},
-      else: {:reply, {:error, "no robot #{inspect(id)} lives here; #{list(living)}"}, s}
+    with :ok <- lives(id, living) do
+      {:reply, :ok, play({:kill, id}, s)}
+    else
+      error -> {:reply, error, s}
+    end
   end
 
   def handle_call({:move, place}, _from, s) do
-    with :ok <- Setup.check_landmarks(s.setup.map, [place]) do
+    with :ok <- Places.check_landmarks(s.setup.map, [place]) do
       {:reply, :ok, play({:move, place}, s)}
+    else
+      error -> {:reply, error, s}
+    end
+  end
+
+  def handle_call({:place, {who, place}}, _from, s) do
+    with :ok <- lives(who, ask(s, :living)),
+         {:ok, event} <- Places.put(ask(s, :world), who, place) do
+      {:reply, :ok, play(event, s)}
     else
       error -> {:reply, error, s}
     end
@@ -268,6 +287,12 @@ defmodule Lab.Fleet do
   defp list(robots), do: "#{Enum.join(robots, ", ")} live"
 
   # Nothing more can happen to a robot that was killed.
+  defp lives(id, living) do
+    if is_binary(id) or id in living,
+      do: :ok,
+      else: {:error, "no robot #{inspect(id)} lives here; #{list(living)}"}
+  end
+
   defp play(event, s) do
     id = Event.robot(event)
     if id in [nil, :all] or id in ask(s, :living), do: happen(event, s), else: s
@@ -281,6 +306,15 @@ defmodule Lab.Fleet do
     if World.Bodies.occupied?(ask(s, :world), id, {x, y}),
       do: note({:stage, :not_displaced, id, %{}}, s),
       else: told(event, become(s, :change, [{:displace, id, pose}]))
+  end
+
+  defp happen({:place, id, {x, y, degrees}} = event, s) do
+    pose = Pose.new(x, y, degrees * :math.pi() / 180)
+
+    case World.Pushing.place(ask(s, :world), id, pose) do
+      {:ok, _world} -> told(event, become(s, :change, [{:place, id, pose}]))
+      {:error, _line} -> note({:stage, :not_placed, nil, %{object: id}}, s)
+    end
   end
 
   defp happen(event, s), do: told(event, change(event, s))

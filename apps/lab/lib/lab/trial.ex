@@ -15,6 +15,7 @@ defmodule Lab.Trial do
     Faults,
     Interventions,
     Mechanics,
+    Places,
     RunLog,
     Script,
     Setup,
@@ -164,7 +165,7 @@ defmodule Lab.Trial do
   @doc "Moves the landmark there from now on, as if a person pushed it."
   @spec move(t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
   def move(trial, place) do
-    with :ok <- Setup.check_landmarks(trial.map, [place]),
+    with :ok <- Places.check_landmarks(trial.map, [place]),
          do: {:ok, %{trial | script: Script.add(trial.script, trial.at_ms, {:move, place})}}
   end
 
@@ -176,6 +177,20 @@ defmodule Lab.Trial do
   @spec displace(t(), atom(), {x :: float(), y :: float(), degrees :: float()}) :: t()
   def displace(trial, id, pose),
     do: %{trial | script: Script.add(trial.script, trial.at_ms, {:displace, id, pose})}
+
+  @doc """
+  Puts a living robot, or an object by its name, such as `"ball1"`, elsewhere now, as a person who lifts it. The error says in
+  one line why it cannot be there.
+  """
+  @spec place(t(), atom() | String.t(), Pose.point()) :: {:ok, t()} | {:error, String.t()}
+  def place(trial, who, place) do
+    if is_binary(who) or who in living(trial) do
+      with {:ok, event} <- Places.put(trial.world, who, place),
+           do: {:ok, %{trial | script: Script.add(trial.script, trial.at_ms, event)}}
+    else
+      {:error, "#{who} is dead, and stays where it is"}
+    end
+  end
 
   @doc "Sends a command to one living robot or to all; a frozen one does not get it."
   @spec command(t(), atom() | :all, term()) :: t()

@@ -10,6 +10,7 @@ defmodule Sim.Floorplan do
   it is not known what is there; `nil` if no cell is.
   """
   alias Nav.Grid
+  alias Sim.Stage
   alias Sim.Floorplan.{Cells, Clearance, Image, Landmark, Maps, Places, Starts}
 
   @enforce_keys [:name, :width, :height, :cell, :field, :room]
@@ -33,8 +34,8 @@ defmodule Sim.Floorplan do
 
   @doc """
   A map by its name, with room for a fleet of this size: one of `Sim.Floorplan.Maps`, a bitmap with
-  its size in metres, such as `"floor.png:16x12"`, or a description as map_server writes it,
-  `"floor.yaml"`. `grey` is for bitmaps: a description says itself what is unknown.
+  its size in metres, such as `"floor.png:16x12"`, a description as map_server writes it,
+  `"floor.yaml"`, or the walls of a world of Stage, `"floor.world"` (`Sim.Stage`). `grey` is for bitmaps: a description says itself what is unknown.
 
       iex> {:ok, map} = Sim.Floorplan.open("hall", 6)
       iex> Sim.Floorplan.size(map)
@@ -46,8 +47,14 @@ defmodule Sim.Floorplan do
   @spec open(String.t(), pos_integer(), grey()) :: {:ok, t()} | {:error, String.t()}
   def open(name, fleet, grey \\ :wall) when fleet > 0 do
     with fields when is_map(fields) <-
-           Maps.draw(name, fleet) || name |> Image.open(grey) |> fields(),
+           Maps.draw(name, fleet) || name |> file(grey) |> fields(),
          do: {:ok, struct!(__MODULE__, fields)}
+  end
+
+  defp file(name, grey) do
+    if name =~ ~r/\.world\z/i,
+      do: with({:ok, world} <- Stage.open(name), do: Stage.Plan.fields(name, world)),
+      else: Image.open(name, grey)
   end
 
   defp fields({:ok, fields}), do: fields

@@ -3,6 +3,12 @@ defmodule Sim.DocTest do
   doctest Sim.World.Contact
   doctest Sim.Lateness
   doctest Sim.Floorplan
+  doctest Sim.Stage
+  doctest Sim.Stage.Tokens
+  doctest Sim.Stage.Entities
+  doctest Sim.Stage.Values
+  doctest Sim.Stage.Colours
+  doctest Sim.Stage.Shape
   doctest Sim.Floorplan.Cells
   doctest Sim.Floorplan.Maps
   doctest Sim.Floorplan.Rooms

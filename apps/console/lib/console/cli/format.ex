@@ -9,7 +9,9 @@ defmodule Console.Cli.Format do
     radio_cut: "the radio is cut",
     radio_whole: "the radio is whole again",
     displaced: "ROBOT is lifted to another place",
-    not_displaced: "ROBOT cannot be put there: somebody stands in the way"
+    not_displaced: "ROBOT cannot be put there: somebody stands in the way",
+    placed: "somebody puts OBJECT elsewhere",
+    not_placed: "OBJECT cannot be put there: there is no room"
   }
 
   @doc """
@@ -101,8 +103,11 @@ defmodule Console.Cli.Format do
   def meaning(%{stage: stage, for_s: for_s, robot: robot}),
     do: "#{robot} is #{stage} for #{decimals(for_s, 1)} s"
 
-  def meaning(%{stage: stage, robot: robot}) when is_map_key(@done, stage),
-    do: String.replace(@done[stage], "ROBOT", "#{robot}")
+  def meaning(%{stage: stage, robot: robot} = told) when is_map_key(@done, stage),
+    do:
+      @done[stage]
+      |> String.replace("ROBOT", "#{robot}")
+      |> String.replace("OBJECT", "#{told[:object]}")
 
   def meaning(%{stage: name}), do: name |> to_string() |> String.replace("_", " ")
 

@@ -31,7 +31,7 @@ defmodule Console.Live.Fleet do
   def stop(live), do: Fleet.stop(live)
 
   @impl Console.Live
-  def offers(_live), do: [:kill, :landmark]
+  def offers(_live), do: [:kill, :landmark, :place]
 
   @impl Console.Live
   def notice(live), do: ended(live)
@@ -72,11 +72,14 @@ defmodule Console.Live.Fleet do
 
   # `:ok` means that robots have accepted the command, not that they reach their goals.
   defp told({:kill, _who}), do: "done"
+  defp told({:place, _who, _place}), do: "done"
   defp told(_order), do: "accepted"
 
   defp carry_out({:kill, who}, live), do: Fleet.kill(live, who)
   defp carry_out({:landmark, :none}, live), do: Fleet.move_landmark(live, nil)
   defp carry_out({:landmark, place}, live), do: Fleet.move_landmark(live, place)
+
+  defp carry_out({:place, who, place}, live), do: Fleet.place(live, who, place)
 
   defp carry_out({:tell, target, command}, live) do
     with :ok <- on_floor(command, Fleet.scene(live).map), do: Swarm.tell(target, command)

@@ -67,7 +67,7 @@ defmodule Console.Live.Trial do
   def stop(live), do: GenServer.stop(live)
 
   @impl Console.Live
-  def offers(_live), do: [:kill, :landmark]
+  def offers(_live), do: [:kill, :landmark, :place]
 
   @impl Console.Live
   def notice(_live), do: nil
@@ -192,6 +192,9 @@ defmodule Console.Live.Trial do
 
   defp carry_out({:landmark, place}, %{module: module, trial: trial}),
     do: with({:ok, trial} <- module.move(trial, place), do: {trial, @done})
+
+  defp carry_out({:place, who, place}, %{module: module, trial: trial}),
+    do: with({:ok, trial} <- module.place(trial, who, place), do: {trial, @done})
 
   defp carry_out({:formation, {kind, spacing}}, %{module: module, trial: trial} = state) do
     {_kind, present} = module.scene(trial).formation

@@ -52,6 +52,7 @@ defmodule Mix.Tasks.Demo do
 
   defp play(options) do
     warn(options)
+    if options.world, do: Enum.each(options.world.notes, &IO.puts(:stderr, &1))
 
     cond do
       options.headless and Options.real_time?(options) ->

@@ -7,7 +7,7 @@ defmodule Lab.Chaos.Draw do
   survive. What happens to a run begins no later than 40 s before its end.
   """
   alias Lab.Chaos.Random
-  alias Lab.Trial.{Options, Setup}
+  alias Lab.Trial.{Options, Places}
 
   # Fixed lists, so that no draw makes an atom.
   @mags for k <- 1..20, do: :"mag#{k}"
@@ -154,7 +154,7 @@ defmodule Lab.Chaos.Draw do
     {x, random} = Random.number(random, low_x, high_x, 1)
     {y, random} = Random.number(random, low_y, high_y, 1)
 
-    if Setup.check_landmarks(plan, [{x, y}]) == :ok,
+    if Places.check_landmarks(plan, [{x, y}]) == :ok,
       do: {{x, y}, random},
       else: place(random, plan, rectangle, left - 1)
   end

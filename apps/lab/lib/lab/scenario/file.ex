@@ -40,7 +40,7 @@ defmodule Lab.Scenario.File do
       [{:formed, [by_s: 60.0]}]
       iex> Lab.Scenario.File.parse("[robots: 1,\\n script: [{5, {:kil, :mag1}}]]", "a.exs")
       {:error, ["a.exs:2: script.1: expected an event, one of kill, move, remove_landmark, tell, " <>
-        "estop, reset, cut, join, loss, freeze, crash, hang, displace, blind, deaf, got {:kil, :mag1}; did you mean kill?"]}
+        "estop, reset, cut, join, loss, freeze, crash, hang, displace, place, blind, deaf, got {:kil, :mag1}; did you mean kill?"]}
   """
   @spec parse(String.t(), name :: String.t()) :: {:ok, Scenario.t()} | {:error, [String.t(), ...]}
   def parse(text, name \\ "scenario"), do: read(text, name, fn _scenario -> [] end)

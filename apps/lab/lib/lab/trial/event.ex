@@ -17,6 +17,7 @@ defmodule Lab.Trial.Event do
   | `{:crash, robot, role}` | this part of its program crashes: `:gate`, `:executive`, `:pilot`, `:estop` or `:comms`; it and those behind it begin anew, the mission idle if it is among them |
   | `{:hang, robot, role, for_s}` | this part, `:executive` or `:pilot`, handles nothing; after 2 s it is killed, as by a crash |
   | `{:displace, robot, {x, y, heading_deg}}` | it is lifted to another place; its wheels do not count that |
+  | `{:place, object, {x, y, heading_deg}}` | a ball or a box, such as `"ball1"`, is put elsewhere |
   | `{:blind, robot, for_s}` | its camera gives no pictures |
   | `{:deaf, robot, for_s}` | it receives no messages |
 
@@ -92,6 +93,7 @@ defmodule Lab.Trial.Event do
       {:crash, [robot: who, role: {:one_of, [:gate, :executive, :pilot, :estop, :comms]}], []},
       {:hang, [robot: who, role: {:one_of, [:executive, :pilot]}, for_s: for_s], []},
       {:displace, [robot: who, pose: pose], []},
+      {:place, [object: {:text, "the name of a ball or a box"}, pose: pose], []},
       {:blind, [robot: who, for_s: for_s], []},
       {:deaf, [robot: who, for_s: for_s], []}
     ]
@@ -220,6 +222,7 @@ defmodule Lab.Trial.Event do
   def stage({:join}), do: {:radio_whole, nil, %{}}
   def stage({:loss, share}), do: {:radio_loss, nil, %{share: share}}
   def stage({:displace, id, _pose}), do: {:displaced, id, %{}}
+  def stage({:place, id, _pose}), do: {:placed, nil, %{object: id}}
   def stage({:crash, id, role}), do: {:crashed, id, %{crash: "its #{role}, by the script"}}
   def stage({:hang, id, role, for_s}), do: {:hangs, id, %{role: role, for_s: for_s}}
   def stage({:freeze, id, for_s}), do: {:frozen, id, %{for_s: for_s}}

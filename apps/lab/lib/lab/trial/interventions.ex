@@ -6,7 +6,7 @@ defmodule Lab.Trial.Interventions do
   alias Hal.Pose
   alias Sim.{Radio, World}
   alias Lab.Trial.{Event, Faults, RunLog}
-  alias Sim.World.Bodies
+  alias Sim.World.{Bodies, Pushing}
 
   @type trial :: %{
           :at_ms => integer(),
@@ -39,6 +39,13 @@ defmodule Lab.Trial.Interventions do
       do: {stage(trial, {:not_displaced, id, %{}}), []},
       else:
         {stage(%{trial | world: World.displace(trial.world, id, pose)}, Event.stage(event)), []}
+  end
+
+  defp act({:place, id, {x, y, degrees}} = event, trial) do
+    case Pushing.place(trial.world, id, Pose.new(x, y, degrees * :math.pi() / 180)) do
+      {:ok, world} -> {stage(%{trial | world: world}, Event.stage(event)), []}
+      {:error, _line} -> {stage(trial, {:not_placed, nil, %{object: id}}), []}
+    end
   end
 
   defp act(event, trial) do

@@ -5,11 +5,11 @@ defmodule Lab.Trial.Options do
   alias Hal.{Profile, RobotName}
   alias Robot.File.Bodies
   alias Missions.Landmark
-  alias Lab.Trial.{Cuts, Event}
+  alias Lab.Trial.{Cuts, Event, WorldFile}
   alias Swarm.MissionRegistry
 
-  @place {:tuple, [{:number, -1.0e4, 1.0e4, "m"}, {:number, -1.0e4, 1.0e4, "m"}],
-          "{x, y} in metres"}
+  @metres List.duplicate({:number, -1.0e4, 1.0e4, "m"}, 2)
+  @place {:tuple, @metres, "{x, y} in metres"}
   @pose {:tuple, List.duplicate({:number, -1.0e4, 1.0e4}, 3), "{x, y, degrees}"}
   # The options of the mission, without those that the robots know themselves.
   @mission [formation: {:column, 1.0}, assign: :cost, leader_change: true, policy: :available] ++
@@ -35,7 +35,8 @@ defmodule Lab.Trial.Options do
   def check(asked) when is_map(asked), do: asked |> Map.to_list() |> check()
 
   def check(asked) do
-    with {:ok, options} <- Options.check(asked, table(), "trial"),
+    with {:ok, asked} <- world(asked),
+         {:ok, options} <- Options.check(asked, table(), "trial"),
          options = Map.merge(Map.new(@mission), Map.new(options)),
          {:ok, options} <- named(options),
          [] <- problems(options),
@@ -46,6 +47,20 @@ defmodule Lab.Trial.Options do
     else
       [_ | _] = problems -> {:error, Options.line(problems, "trial")}
       error -> error
+    end
+  end
+
+  # What the file of a world says, under what else is asked.
+  defp world(asked) do
+    with true <- Keyword.keyword?(asked),
+         {file, asked} when is_binary(file) <- Keyword.pop(asked, :world),
+         {:own, nil} <- {:own, Enum.find(WorldFile.keys(), &Keyword.has_key?(asked, &1))},
+         {:ok, world} <- WorldFile.open(file) do
+      {:ok, Keyword.merge(world.options, asked)}
+    else
+      {:own, key} -> {:error, "trial option #{key} is said by the world's file; leave it out"}
+      {:error, line} -> {:error, "trial option world: #{line}"}
+      _no_world -> {:ok, asked}
     end
   end
 
@@ -70,12 +85,16 @@ defmodule Lab.Trial.Options do
          ~s(the name of a map, "FILE.yaml", "FILE.png:WIDTHxHEIGHT" or "FILE.pgm:WIDTHxHEIGHT")},
         default: "hall"
       ],
+      world: [{:or, nil, {:path, ~s(the file of a world, "FILE.world")}}, default: nil],
       grey: [{:one_of, [:wall, :floor]}, default: :wall],
-      start: [{:one_of, [:spread, :same]}, default: :spread],
+      start: [{:or, :spread, {:or, :same, {:list, @pose, 1000}}}, default: :spread],
       landmark: [{:or, :default, {:or, :none, @place}}, default: :default],
       marks: [{:or, nil, {:keys, marks()}}, default: nil],
-      balls: [{:list, @place}, default: []],
-      boxes: [{:list, @pose}, default: []],
+      balls: [{:list, {:check, &ball/1, "{x, y} or {x, y, radius} in metres"}}, default: []],
+      boxes: [
+        {:list, {:check, &box/1, "{x, y, degrees} or {x, y, degrees, length, width}"}},
+        default: []
+      ],
       moves: [{:check, &moves?/1, "[{{x, y}, at_s}]"}, default: []],
       kills: [{:check, &kills?/1, "[{robot, at_s}]"}, default: []],
       script: [Event.script_type(), default: []],
@@ -111,6 +130,27 @@ defmodule Lab.Trial.Options do
     )
   end
 
+  defp ball({_x, _y} = place), do: Type.read(@place, place)
+
+  defp ball({_x, _y, _radius} = ball),
+    do: Type.read({:tuple, @metres ++ [{:number, 0.03, 1.0, "m"}], "{x, y, radius}"}, ball)
+
+  defp ball(_other), do: false
+
+  defp box({_x, _y, _degrees} = pose), do: Type.read(@pose, pose)
+
+  defp box({_x, _y, _degrees, _length, _width} = box) do
+    sides = List.duplicate({:number, 0.1, 5.0, "m"}, 2)
+
+    Type.read(
+      {:tuple, List.duplicate({:number, -1.0e4, 1.0e4}, 3) ++ sides,
+       "{x, y, degrees, length, width}"},
+      box
+    )
+  end
+
+  defp box(_other), do: false
+
   defp mission, do: Keyword.take(Landmark.Options.table(), Keyword.keys(@mission))
 
   # What its options say counts for all that looks at the run, too.
@@ -138,10 +178,18 @@ defmodule Lab.Trial.Options do
              "expected {robot, at_s} with a robot of this run, or :leader, got #{inspect(kill)}" <>
                Suggest.hint(inspect(who), robots)}
 
+    starts =
+      if is_list(options.start) and length(options.start) != length(robots),
+        do: [
+          {["start"],
+           "expected a pose for each of #{length(robots)} robots, got #{length(options.start)}"}
+        ],
+        else: []
+
     cut? = Cuts.valid?(options.cuts, robots)
 
     if(cut?, do: [], else: [{["cuts"], cuts <> Wording.show(options.cuts)}]) ++
-      kills ++ Event.problems(options.script, robots)
+      starts ++ kills ++ Event.problems(options.script, robots)
   end
 
   @doc """

@@ -4,15 +4,9 @@ defmodule Lab.Trial.Setup do
   configuration. Pure; the trial and the live fleet both use it.
   """
   alias Hal.{Pose, Profile}
-  alias Lab.Trial.Options
+  alias Lab.Trial.{Options, Places}
   alias Sim.World
-  alias Sim.World.Object
   alias Vision.Marks
-
-  # How often starts are drawn again, and how far from objects they must be.
-  @draws 50
-  @next_seed 1_000_003
-  @beside 0.1
 
   @enforce_keys [:options, :map, :world, :robots, :mission]
   defstruct @enforce_keys ++ [plan: nil]
@@ -33,15 +27,15 @@ defmodule Lab.Trial.Setup do
 
   @doc """
   A setup. Options (a keyword list or a map; all have defaults): `robots` (ids), `bodies` (`Lab.Trial.Options.bodies/2`), `seed`,
-  `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread` or `:same`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
+  `map`, `grey` (`:wall` or `:floor`: what the grey of a bitmap is that seems to stand for what is unknown), `start` (`:spread`, `:same`, or a pose for each robot, `[{x, y, degrees}]`), `world` (a file of Stage's instead of `robots`, `bodies`, `map` and `start`: `Lab.Trial.WorldFile`), `landmark` (`{x, y}`, `:none` or `:default`), `moves`
   (`[{{x, y}, at_s}]`), `kills` (`[{:leader | id, at_s}]`), `script` (`[{at_s, event}]`, `Lab.Trial.Event`), `loss` and `duplicates` (0 to 1), `delay_ms` (`{5, 50}`), `cuts` (`Lab.Trial.Cuts`), `noise` (`:off`,
   `:default`, `:slip`), `formation` (`kind` or `{kind, spacing}`), `assign` (`:chain` or `:cost`),
   `leader_change`, `policy` (`:available` or `:majority`, with `of`, default the number of robots), `lost_link`
   (`:stop`, `:hold` or `:continue`), `mission` (another one than the landmark's, by `Swarm.MissionRegistry`: `:patrol`,
   `{:patrol, period: 90}`), `duration_s`, `blobs` (`:painted` or `:direct`), `marks` (printed marks that hang
   in the world, and that all robots look for: `[size: 0.3, at: [{7, {x, y, degrees}}], known: :all]`; `known` are those of
-  which they are told where they hang, `[]` by default), `balls` (`[{x, y}]`) and `boxes`
-  (`[{x, y, degrees}]`) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
+  which they are told where they hang, `[]` by default), `balls` (`[{x, y}]`, or with a radius) and `boxes`
+  (`[{x, y, degrees}]`, or with length and width) that robots can push (`Sim.World.Object`), named `ball1`, `box1` and so on, `hardware` (robots with the real drivers, in real time only), `casts` (in lockstep only:
   `:sent` or `:drawn`, in which order the parts of a robot's program hear each other). Errors are one line.
   """
   @spec new(keyword() | map()) :: {:ok, t()} | {:error, String.t()}
@@ -76,13 +70,13 @@ defmodule Lab.Trial.Setup do
 
     with {:ok, map} <-
            at(["map"], Sim.Floorplan.open(options.map, length(options.robots), options.grey)),
-         :ok <- at(["landmark"], check_landmarks(map, asked)),
-         :ok <- at(["moves"], check_landmarks(map, moves)),
+         :ok <- at(["landmark"], Places.check_landmarks(map, asked)),
+         :ok <- at(["moves"], Places.check_landmarks(map, moves)),
          :ok <- at(["marks"], check_marks(options)),
-         :ok <- check_objects(map, objects(options)),
-         :ok <- check_script(map, options),
+         :ok <- Places.check_objects(map, Places.objects(options)),
+         :ok <- Places.check_script(map, options),
          {:ok, landmark, starts} <-
-           at(["map"], places(map, bodies, options, landmark)) do
+           at(["map"], Places.choose(map, bodies, options, landmark)) do
       {:ok, build(options, map, Enum.zip(options.robots, starts), landmark)}
     end
   end
@@ -105,17 +99,6 @@ defmodule Lab.Trial.Setup do
           seed: options.seed,
           order: if(options.casts == :drawn, do: {options.seed, n, 0})
         ]
-  end
-
-  @doc "Checks that the landmark can stand at all these places (`nil`: no landmark)."
-  @spec check_landmarks(Sim.Floorplan.t(), [Pose.point() | nil]) :: :ok | {:error, String.t()}
-  def check_landmarks(map, places) do
-    Enum.find_value(places, :ok, fn place ->
-      case place && Sim.Floorplan.check_landmark(map, place) do
-        {:error, line} -> {:error, line}
-        _fine -> nil
-      end
-    end)
   end
 
   @doc "What the cameras of such a run look for, as an option of `Robot.Config`; `nil` for no marks."
@@ -162,70 +145,6 @@ defmodule Lab.Trial.Setup do
       for({id, robot} <- Keyword.get(marks, :robots, []), do: [id: id, robot: robot] ++ alike)
   end
 
-  defp objects(options) do
-    balls =
-      for {{x, y}, n} <- Enum.with_index(options.balls, 1),
-          do: [id: "ball#{n}", kind: :ball, pose: Pose.new(x, y)]
-
-    boxes =
-      for {{x, y, degrees}, n} <- Enum.with_index(options.boxes, 1),
-          do: [id: "box#{n}", kind: :box, pose: Pose.new(x, y, degrees * :math.pi() / 180)]
-
-    Enum.map(balls ++ boxes, &Object.new!/1)
-  end
-
-  defp check_objects(map, objects) do
-    Enum.find_value(objects, :ok, fn %{id: id, kind: kind, pose: pose} = object ->
-      unless Object.free?(object, map) do
-        n = String.replace_prefix(id, "#{kind}", "")
-        line = "#{id} cannot be at #{pose.x},#{pose.y} of map #{map.name}: there is a wall"
-        at([if(kind == :ball, do: "balls", else: "boxes"), n], {:error, line})
-      end
-    end)
-  end
-
-  # Of the starts that further seeds give, the first at which no robot stands on an object.
-  defp places(map, bodies, %{seed: seed} = options, landmark) do
-    objects = objects(options)
-
-    Enum.find_value(0..@draws, fn draw ->
-      with {:ok, _landmark, starts} = places <-
-             Sim.Floorplan.places(map, bodies, seed + draw * @next_seed, landmark) do
-        stands? = fn {{_id, radius}, %{x: x, y: y}} ->
-          Enum.any?(objects, &(elem(Object.gap(&1, {x, y, radius}), 0) < @beside))
-        end
-
-        if draw == @draws or not Enum.any?(Enum.zip(bodies, starts), stands?), do: places
-      end
-    end)
-  end
-
-  # Places that a script names, which depend on the map.
-  defp check_script(map, options) do
-    options.script
-    |> Enum.with_index(1)
-    |> Enum.find_value(:ok, fn {{_at_s, event}, n} ->
-      with {:error, _line} = error <- check_event(map, event, options.bodies),
-           do: at(["script", "#{n}"], error),
-           else: (_fine -> nil)
-    end)
-  end
-
-  defp check_event(map, {:move, place}, _bodies), do: check_landmarks(map, [place])
-
-  defp check_event(map, {:displace, who, {x, y, _deg}}, bodies),
-    do: check_place(map, who, {x, y}, bodies)
-
-  defp check_event(_map, _event, _bodies), do: :ok
-
-  defp check_place(map, who, {x, y} = place, bodies) do
-    ids = if who == :leader, do: Map.keys(bodies), else: [who]
-    radius = ids |> Enum.map(&bodies[&1].radius) |> Enum.max()
-
-    unless Sim.Floorplan.free?(map, place, radius),
-      do: {:error, "#{who} cannot be put at #{x},#{y} of map #{map.name}: there is a wall"}
-  end
-
   defp build(options, map, robots, landmark) do
     common = common_start(options, robots)
 
@@ -236,7 +155,7 @@ defmodule Lab.Trial.Setup do
         noise: options.noise,
         landmark: landmark,
         marks: hung(options.marks),
-        objects: objects(options),
+        objects: Places.objects(options),
         robots:
           for {id, pose} <- robots do
             odometry = if common, do: displaced(options, id, common, pose), else: Pose.new(0, 0)

@@ -38,6 +38,7 @@ defmodule Sim.World.Server do
   @type change ::
           {:kill, robot :: atom()}
           | {:displace, robot :: atom(), Pose.t()}
+          | {:place, object :: String.t(), Pose.t()}
           | {:move, Pose.point() | nil}
 
   @doc "Starts a world's server. Options: `name` (any term), `world` (`Sim.World`)."
@@ -106,6 +107,14 @@ defmodule Sim.World.Server do
   @spec changed(World.t(), change()) :: World.t()
   def changed(world, {:kill, robot}), do: World.kill(world, robot)
   def changed(world, {:displace, robot, pose}), do: World.displace(world, robot, pose)
+  # Where a robot has driven since, it stays where it was.
+  def changed(world, {:place, object, pose}) do
+    case World.Pushing.place(world, object, pose) do
+      {:ok, world} -> world
+      {:error, _line} -> world
+    end
+  end
+
   def changed(world, {:move, nil}), do: World.place_landmark(world, nil)
   def changed(world, {:move, place}), do: World.move_landmark(world, place)
 
