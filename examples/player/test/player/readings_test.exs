@@ -80,14 +80,14 @@ defmodule Player.ReadingsTest do
           turn.(-2 * quarter, quarter, [65_535, 0, 1_000, 2_000])
         ] do
       <<least::float-32, most::float-32, step::float-32, 8.0::float-32, 4::32, 4::32,
-        8.0::float-32, 0.0::float-32, 1.0::float-32, 2.0::float-32, 0::32, 0::32,
+        8.0::float-32, 0::32, 1.0::float-32, 2.0::float-32, 0::32, 0::32,
         0::32>> = payload({:laser, 0}, about(%{scan: scan}))
 
       assert_in_delta least, -2 * quarter, 1.0e-6
       assert_in_delta most, quarter, 1.0e-6
       assert_in_delta step, quarter, 1.0e-6
 
-      assert <<4::32, 4::32, 8.0::float, 0.0::float, 1.0::float, 2.0::float>> =
+      assert <<4::32, 4::32, 8.0::float, 0::64, 1.0::float, 2.0::float>> =
                payload({:ranger, 2}, about(%{scan: scan}))
     end
   end
@@ -155,9 +155,8 @@ defmodule Player.ReadingsTest do
   test "how sure it is of its place, as a covariance" do
     sure = %{uncertainty: %{radius: 0.2447746830680816, heading: 0.02}}
 
-    <<0::32, 0.0::float, 1::32, 1::32, 1.0::float, 2.0::float, 0.5::float, x2::float, y2::float,
-      a2::float, 0.0::float, 0.0::float, 0.0::float,
-      1.0::float>> = payload({:localize, 0}, about(sure))
+    <<0::32, 0::64, 1::32, 1::32, 1.0::float, 2.0::float, 0.5::float, x2::float, y2::float,
+      a2::float, 0::64, 0::64, 0::64, 1.0::float>> = payload({:localize, 0}, about(sure))
 
     assert_in_delta x2, 0.01, 1.0e-6
     assert_in_delta y2, 0.01, 1.0e-6
@@ -171,14 +170,14 @@ defmodule Player.ReadingsTest do
       Session.hear(session, Client.message(device, 2, subtype, payload), 0.0)
     end
 
-    place = <<1.0::float, 2.0::float, 0.5::float, 0.0::float, 0.0::float, 0.0::float, 1::32>>
+    place = <<1.0::float, 2.0::float, 0.5::float, 0::64, 0::64, 0::64, 1::32>>
     {:ok, session, [order: "mag1 goto:1.0:2.0:0.5"]} = hear.(session, {4, 0}, 2, place)
     {:ok, session, []} = hear.(session, {4, 0}, 2, place)
 
     {:ok, session, [drive: 0.2, drive: 0.0]} =
       Session.hear(
         session,
-        Client.message({4, 0}, 2, 1, <<0.2::float, 0.0::float, 0.0::float, 1::32>>),
+        Client.message({4, 0}, 2, 1, <<0.2::float, 0::64, 0::64, 1::32>>),
         0.0
       )
       |> drives()

@@ -91,9 +91,8 @@ defmodule Player.ServerTest do
     rule = <<-1::signed-32, -1::signed-32, 1::signed-32, -1::signed-32, 1::signed-32>>
     {:ack, "", client} = request(client, {1, 0}, 10, rule)
 
-    {:ack,
-     <<0.0::float, 0.0::float, 0.0::float, 0.0::float, 0.0::float, 0.0::float, 0.4::float,
-       0.4::float, _height::float>>, client} = request(client, @position2d, 1)
+    {:ack, <<0::64, 0::64, 0::64, 0::64, 0::64, 0::64, 0.4::float, 0.4::float, _height::float>>,
+     client} = request(client, @position2d, 1)
 
     for_each = fn client, device, subtype, bytes ->
       {:ack, <<16::32, 16::32, poses::binary>>, client} = request(client, device, subtype)
@@ -167,7 +166,7 @@ defmodule Player.ServerTest do
   test "the map comes in tiles", %{port: port} do
     client = port |> Client.open() |> pull()
 
-    {:ack, <<scale::float-32, width::32, height::32, x::float, y::float, 0.0::float>>, client} =
+    {:ack, <<scale::float-32, width::32, height::32, x::float, y::float, 0::64>>, client} =
       request(client, {42, 0}, 1)
 
     assert_in_delta x, -width * scale / 2, scale
@@ -225,7 +224,7 @@ defmodule Player.ServerTest do
     {:ack, "", client} = request(client, @position2d, 6)
     {at, client} = await(client, @position2d, &position/1)
     assert abs(at.x) < 0.1 and abs(at.y) < 0.1 and abs(at.yaw) < 0.1
-    goal = <<0.5::float, 0.0::float, 0.0::float, 0.0::float, 0.0::float, 0.0::float, 1::32>>
+    goal = <<0.5::float, 0::64, 0::64, 0::64, 0::64, 0::64, 1::32>>
     client = command(client, @position2d, 2, goal)
 
     {_at, _client} =

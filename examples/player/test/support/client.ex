@@ -130,12 +130,11 @@ defmodule Player.Client do
 
   @doc "A reading of position2d."
   def position(
-        <<x::float-64, y::float-64, yaw::float-64, vx::float-64, 0.0::float-64, va::float-64,
-          stall::32>>
+        <<x::float-64, y::float-64, yaw::float-64, vx::float-64, 0::64, va::float-64, stall::32>>
       ),
       do: %{x: x, y: y, yaw: yaw, vx: vx, va: va, stall: stall}
 
   @doc "A velocity, as `playerc_position2d_set_cmd_vel` sends it."
   def velocity(client, ahead, left),
-    do: command(client, {4, 0}, 1, <<ahead::float-64, 0.0::float-64, left::float-64, 1::32>>)
+    do: command(client, {4, 0}, 1, <<ahead::float-64, 0::64, left::float-64, 1::32>>)
 end
