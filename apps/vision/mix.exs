@@ -6,11 +6,14 @@ defmodule Vision.MixProject do
   def project do
     Convoy.Support.project(:vision,
       native: [
-        nifs: [blobs: ["blobs.c", "runs.c", "masks.c", "blobs_nif.c"]],
+        nifs: [
+          blobs: ["blobs.c", "runs.c", "masks.c", "blobs_nif.c"],
+          similar: ["similar.c", "similar_read.c", "blobs.c", "runs.c", "masks.c", "marks_terms.c", "similar_nif.c"]
+        ],
         optional: [
           marks:
             {"apriltag", "apriltag/apriltag.h",
-             ["marks.c", "blobs.c", "runs.c", "masks.c", "marks_nif.c"]}
+             ["marks.c", "blobs.c", "runs.c", "masks.c", "marks_terms.c", "marks_nif.c"]}
         ]
       ],
       packages: [nx: "~> 0.6", evision: "~> 0.2.10"],

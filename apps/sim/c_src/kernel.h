@@ -57,15 +57,17 @@ typedef struct {
     uint8_t kind, paint[3];
 } sim_pole;
 
-/* A flat square picture that stands upright: the place of its middle, where it faces, how high the middle is, and
- * `cells` x `cells` cells, not 0 is white, row by row from the top. */
+enum { SIM_MOST_CELLS = 32 };
+
+/* A flat picture that stands upright: its place, where it faces, how high the middle of its rows is; `rows` of the same
+ * height, `columns` from edge to edge (from the place, to the right as it is looked at); not 0 is white, row by row from
+ * the top. */
 typedef struct {
-    double x, y, cosine, sine, middle, cell;
-    int64_t cells;
+    double x, y, cosine, sine, middle, row;
+    int64_t rows, columns;
+    double edges[SIM_MOST_CELLS + 1];
     const uint8_t *white;
 } sim_mark;
-
-enum { SIM_MOST_CELLS = 32 };
 
 /* What one column shows of one pole: rows top to bottom, and how bright. */
 typedef struct {

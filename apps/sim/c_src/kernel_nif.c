@@ -391,13 +391,13 @@ static ERL_NIF_TERM join(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return answer(env, result);
 }
 
-/* [{x, y, cosine, sine, middle, cell, cells, white}], marks. */
+/* [{x, y, cosine, sine, middle, row, rows, edges, white}], marks. */
 static int get_marks(ErlNifEnv *env, ERL_NIF_TERM list, sim_mark **marks, size_t *count)
 {
     unsigned length;
     ERL_NIF_TERM head;
     const ERL_NIF_TERM *e;
-    ErlNifBinary white;
+    ErlNifBinary edges, white;
 
     if (!enif_get_list_length(env, list, &length) || length > MOST_MARKS)
         return 0;
@@ -406,15 +406,23 @@ static int get_marks(ErlNifEnv *env, ERL_NIF_TERM list, sim_mark **marks, size_t
         return 0;
     *count = length;
     for (sim_mark *mark = *marks; enif_get_list_cell(env, list, &head, &list); mark++) {
-        ErlNifSInt64 cells;
-        if (!tuple(env, head, 8, &e) || !number(env, e[0], -WORLD, WORLD, &mark->x) ||
+        ErlNifSInt64 rows;
+        if (!tuple(env, head, 9, &e) || !number(env, e[0], -WORLD, WORLD, &mark->x) ||
             !number(env, e[1], -WORLD, WORLD, &mark->y) || !number(env, e[2], -1.1, 1.1, &mark->cosine) ||
             !number(env, e[3], -1.1, 1.1, &mark->sine) || !number(env, e[4], -1000.0, 1000.0, &mark->middle) ||
-            !number(env, e[5], 1.0e-5, 100.0, &mark->cell) || !enif_get_int64(env, e[6], &cells) || cells < 1 ||
-            cells > SIM_MOST_CELLS || !enif_inspect_binary(env, e[7], &white) ||
-            white.size != (size_t)(cells * cells))
+            !number(env, e[5], 1.0e-5, 100.0, &mark->row) || !enif_get_int64(env, e[6], &rows) || rows < 1 ||
+            rows > SIM_MOST_CELLS || !enif_inspect_binary(env, e[7], &edges) || edges.size < 2 * sizeof(double) ||
+            edges.size > sizeof mark->edges || edges.size % sizeof(double) != 0 ||
+            !enif_inspect_binary(env, e[8], &white) ||
+            white.size != (size_t)rows * (edges.size / sizeof(double) - 1))
             return 0;
-        mark->cells = cells;
+        mark->rows = rows;
+        mark->columns = (int64_t)(edges.size / sizeof(double)) - 1;
+        memcpy(mark->edges, edges.data, edges.size);
+        for (int64_t k = 0; k <= mark->columns; k++)
+            if (!(mark->edges[k] >= -WORLD && mark->edges[k] <= WORLD) ||
+                (k > 0 && mark->edges[k] < mark->edges[k - 1]))
+                return 0;
         mark->white = white.data;
     }
     return 1;

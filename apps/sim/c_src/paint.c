@@ -261,12 +261,13 @@ enum { SAMPLES = 4, WHITE = 225, BLACK = 30 };
 /* The columns and rows that a mark can cover; 0 if none. */
 static int mark_box(const sim_sight *sight, const sim_mark *mark, sim_span *columns, sim_span *rows)
 {
-    const double half = (double)mark->cells * mark->cell / 2, middle = (double)(sight->width - 1) / 2;
+    const double half = (double)mark->rows * mark->row / 2, middle = (double)(sight->width - 1) / 2;
     double left = FARTHEST * FARTHEST, right = -left, top = left, bottom = right;
 
-    for (int end = -1; end <= 1; end += 2) {
-        double dx = mark->x - end * half * mark->sine - sight->x;
-        double dy = mark->y + end * half * mark->cosine - sight->y;
+    for (int end = 0; end <= 1; end++) {
+        double edge = mark->edges[end * mark->columns];
+        double dx = mark->x - edge * mark->sine - sight->x;
+        double dy = mark->y + edge * mark->cosine - sight->y;
         double depth = sight->cosine * dx + sight->sine * dy;
         double side = sight->cosine * dy - sight->sine * dx;
         if (depth < MARK_NEAREST)
@@ -292,10 +293,22 @@ static double front(const sim_sight *sight, const sim_mark *mark, double rx, dou
     return along < -MARK_EDGE && ahead < 0.0 ? ahead / along : -1.0;
 }
 
-/* The number of a cell, -1 beside the mark. */
-static int64_t cell(const sim_mark *mark, double at)
+/* The number of a column, -1 beside the mark. */
+static int64_t column_at(const sim_mark *mark, double at)
 {
-    return at >= 0.0 && at < (double)mark->cells ? (int64_t)at : -1;
+    int64_t k = 0;
+
+    if (!(at >= mark->edges[0] && at < mark->edges[mark->columns]))
+        return -1;
+    while (at >= mark->edges[k + 1])
+        k++;
+    return k;
+}
+
+/* The same of a row. */
+static int64_t row_at(const sim_mark *mark, double at)
+{
+    return at >= 0.0 && at < (double)mark->rows ? (int64_t)at : -1;
 }
 
 static double sample(int k)
@@ -326,7 +339,7 @@ static void put_mark(const sim_map *map, const sim_sight *sight, const sim_pole 
                      const sim_mark *mark, const sim_scratch *scratch, uint8_t *picture)
 {
     const int64_t width = sight->width, half = width / 2;
-    const double middle = (double)mark->cells / 2;
+    const double middle = (double)mark->rows / 2;
     uint8_t *u = picture + width * sight->height, *v = u + half * (sight->height / 2);
     sim_span columns, rows;
 
@@ -344,7 +357,7 @@ static void put_mark(const sim_map *map, const sim_sight *sight, const sim_pole 
             ray(sight, (double)column + sample(k), &rx, &ry);
             double d = depths[k] = front(sight, mark, rx, ry);
             double x = sight->x + rx * d - mark->x, y = sight->y + ry * d - mark->y;
-            across[k] = d < 0.0 ? -1 : cell(mark, (y * mark->cosine - x * mark->sine) / mark->cell + middle);
+            across[k] = d < 0.0 ? -1 : column_at(mark, y * mark->cosine - x * mark->sine);
         }
         for (int64_t row = rows.first; row <= rows.last && row < above; row++) {
             int sum = 0, inside = 0;
@@ -354,10 +367,10 @@ static void put_mark(const sim_map *map, const sim_sight *sight, const sim_pole 
                         continue;
                     double height =
                         sight->eye + (sight->horizon - ((double)row + sample(j))) * depths[k] / sight->focal;
-                    int64_t down = cell(mark, (mark->middle - height) / mark->cell + middle);
+                    int64_t down = row_at(mark, (mark->middle - height) / mark->row + middle);
                     if (down < 0)
                         continue;
-                    sum += mark->white[down * mark->cells + across[k]] ? WHITE : BLACK;
+                    sum += mark->white[down * mark->columns + across[k]] ? WHITE : BLACK;
                     inside++;
                 }
             if (inside == 0)

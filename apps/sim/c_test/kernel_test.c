@@ -158,15 +158,17 @@ static void pictures(const sim_map *map, const int8_t *tables)
     size_t mark_count = draw() % 4;
     sim_mark *marks = exactly(mark_count * sizeof *marks);
     for (size_t k = 0; k < mark_count; k++) {
-        int64_t cells = upto(12);
-        uint8_t *white = exactly((size_t)(cells * cells));
-        for (int64_t n = 0; n < cells * cells; n++)
+        int64_t rows = upto(12), columns = upto(12);
+        uint8_t *white = exactly((size_t)(rows * columns));
+        for (int64_t n = 0; n < rows * columns; n++)
             white[n] = draw() % 2;
         /* Anywhere, or right before the camera. */
         double reach = draw() % 2 ? 1.0 : 100.0;
         marks[k] = (sim_mark){sight.x + place(map->width, map->cell) / reach,
                               sight.y + place(map->height, map->cell) / reach, 1.0, 0.0, unit() * 2,
-                              0.001 + unit() / 4, cells, white};
+                              0.001 + unit() / 4, rows, columns, {-unit()}, white};
+        for (int64_t n = 0; n < columns; n++)
+            marks[k].edges[n + 1] = marks[k].edges[n] + unit() / 4;
         direction(&marks[k].cosine, &marks[k].sine);
     }
     sim_paint(map, &sight, poles, count, marks, mark_count, &noise, tables, &scratch, picture);

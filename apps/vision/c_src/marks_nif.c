@@ -1,8 +1,7 @@
 /* Checks the arguments of Vision.Marks.Native, and makes a list of what marks.c finds. */
 #include <erl_nif.h>
 
-#include "blobs.h"
-#include "marks.h"
+#include "marks_terms.h"
 
 /* The library's detector is for one thread at a time. */
 struct kept {
@@ -61,68 +60,19 @@ static ERL_NIF_TERM new(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
     return kept->detector ? term : enif_raise_exception(env, enif_make_atom(env, "system_limit"));
 }
 
-/* format, width, height, bytes, {left, top, right, bottom}: the first column and row of the box, and those behind the last. */
-static int get_luma(ErlNifEnv *env, const ERL_NIF_TERM argv[], struct marks_luma *luma)
-{
-    int format, arity;
-    unsigned width, height, box[4];
-    ErlNifBinary bytes;
-    const ERL_NIF_TERM *sides;
-    struct blobs_picture picture;
-
-    if (!enif_get_int(env, argv[0], &format) || !enif_get_uint(env, argv[1], &width) ||
-        !enif_get_uint(env, argv[2], &height) || !enif_inspect_binary(env, argv[3], &bytes) ||
-        !enif_get_tuple(env, argv[4], &arity, &sides) || arity != 4 ||
-        blobs_lay(format, width, height, bytes.data, bytes.size, &picture) != 0)
-        return 0;
-    for (int k = 0; k < 4; k++)
-        if (!enif_get_uint(env, sides[k], box + k))
-            return 0;
-    if (box[2] > width || box[3] > height || box[0] >= box[2] || box[1] >= box[3])
-        return 0;
-    *luma = (struct marks_luma){ .first = picture.y + box[1] * picture.y_row + box[0] * picture.y_step,
-                                 .step = picture.y_step, .row = picture.y_row,
-                                 .width = box[2] - box[0], .height = box[3] - box[1] };
-    return luma->width >= MARKS_LEAST && luma->width <= MARKS_MOST && luma->height >= MARKS_LEAST &&
-           luma->height <= MARKS_MOST;
-}
-
-struct list {
-    ErlNifEnv *env;
-    ERL_NIF_TERM term;
-};
-
-static void put(const struct marks_found *found, void *context)
-{
-    struct list *list = context;
-    ErlNifEnv *env = list->env;
-    ERL_NIF_TERM corners[4];
-
-    for (int k = 0; k < 4; k++)
-        corners[k] = enif_make_tuple2(env, enif_make_double(env, found->corners[k][0]),
-                                      enif_make_double(env, found->corners[k][1]));
-    ERL_NIF_TERM mark = enif_make_tuple5(env, enif_make_int(env, found->id), enif_make_int(env, found->hamming),
-                                         enif_make_double(env, found->margin),
-                                         enif_make_tuple2(env, enif_make_double(env, found->x),
-                                                          enif_make_double(env, found->y)),
-                                         enif_make_list_from_array(env, corners, 4));
-
-    list->term = enif_make_list_cell(env, mark, list->term);
-}
-
 /* find(detector, format, width, height, bytes, box) */
 static ERL_NIF_TERM find(ErlNifEnv *env, int argc, const ERL_NIF_TERM argv[])
 {
     void *object;
     struct marks_luma luma;
 
-    if (argc != 6 || !enif_get_resource(env, argv[0], kept_type, &object) || !get_luma(env, argv + 1, &luma))
+    if (argc != 6 || !enif_get_resource(env, argv[0], kept_type, &object) || !marks_get_luma(env, argv + 1, &luma))
         return enif_make_badarg(env);
     struct kept *kept = object;
-    struct list list = { env, enif_make_list(env, 0) };
+    struct marks_list list = { env, enif_make_list(env, 0) };
 
     enif_mutex_lock(kept->lock);
-    int result = marks_find(kept->detector, &luma, put, &list);
+    int result = marks_find(kept->detector, &luma, marks_put, &list);
 
     enif_mutex_unlock(kept->lock);
     if (result != 0)

@@ -102,11 +102,13 @@ defmodule Sim.ComputeTest do
       {x, y} = place(map)
       {c, s} = direction()
       reach = Enum.random([1, 30])
-      cells = :rand.uniform(11)
-      white = for _ <- 1..(cells * cells), into: <<>>, do: <<:rand.uniform(2) - 1>>
+      [rows, columns] = for _ <- 1..2, do: :rand.uniform(11)
+      white = for _ <- 1..(rows * columns), into: <<>>, do: <<:rand.uniform(2) - 1>>
+      edges = Enum.sort(for _ <- 0..columns, do: 2 * :rand.uniform() - 0.8)
+      edges = for edge <- edges, into: <<>>, do: <<edge::float-native>>
 
       {elem(sight, 0) + x / reach, elem(sight, 1) + y / reach, c, s, :rand.uniform() * 1.5,
-       0.01 + :rand.uniform() / 5, cells, white}
+       0.01 + :rand.uniform() / 5, rows, edges, white}
     end
   end
 
@@ -321,7 +323,8 @@ defmodule Sim.ComputeTest do
     badarg.(fn -> Compute.Native.look(map, sight, <<0::544>>) end)
     badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [], nil, <<tables::binary, 0>>) end)
     badarg.(fn -> Compute.Native.paint(map, put_elem(sight, 5, 0.0), <<>>, [], nil, tables) end)
-    mark = {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 2, <<0, 1, 1, 0>>}
+    edges = &for(edge <- &1, into: <<>>, do: <<edge * 1.0::float-native>>)
+    mark = {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 2, edges.([-1, 0, 1]), <<0, 1, 1, 0>>}
 
     for wrong <- [
           :no,
@@ -329,7 +332,12 @@ defmodule Sim.ComputeTest do
           put_elem(mark, 2, 2.0),
           put_elem(mark, 5, 0.0),
           put_elem(mark, 6, 3),
-          {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 33, :binary.copy(<<0>>, 33 * 33)}
+          put_elem(mark, 7, edges.([-1, 1])),
+          put_elem(mark, 7, edges.([1, 0, 1])),
+          put_elem(mark, 7, edges.([-1, 0, 1.0e9])),
+          put_elem(mark, 7, <<edges.([-1, 0, 1])::binary, 0>>),
+          {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 33, edges.([0, 1]), :binary.copy(<<0>>, 33)},
+          {1.0, 0.0, -1.0, 0.0, 0.3, 0.02, 1, edges.(0..33), :binary.copy(<<0>>, 33)}
         ],
         do: badarg.(fn -> Compute.Native.paint(map, sight, <<>>, [mark, wrong], nil, tables) end)
 

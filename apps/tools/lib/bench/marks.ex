@@ -4,7 +4,7 @@ defmodule Bench.Marks do
   spoils it. Pure.
   """
   alias Hal.Frame
-  alias Vision.Marks.Native
+  alias Vision.Marks.Picture
 
   # In the middle of the picture, wherever that lies among the pixels.
   @width 160
@@ -20,9 +20,10 @@ defmodule Bench.Marks do
   @type picture :: [[float()]]
   @type condition :: :clean | :noise | :contrast | :blur | :blur_and_noise
 
-  @doc "How wide the square between the corners is, in pixels."
-  @spec widths() :: [pos_integer(), ...]
-  def widths, do: [12, 16, 20, 24, 32]
+  @doc "How wide the square between the corners is, in pixels: more for a family that needs more."
+  @spec widths(Vision.Mark.family()) :: [pos_integer(), ...]
+  def widths(:similar), do: [20, 24, 30, 40, 50]
+  def widths(_apriltag), do: [12, 16, 20, 24, 32]
 
   @doc "What is done to a picture, in the order of the table."
   @spec conditions() :: [{condition(), String.t()}, ...]
@@ -39,21 +40,25 @@ defmodule Bench.Marks do
   @spec draw(Vision.Mark.family(), pos_integer(), :rand.state()) ::
           {picture(), id :: non_neg_integer(), :rand.state()}
   def draw(family, width, random) do
-    {id, random} = :rand.uniform_s(if(family == :tag36h11, do: 587, else: 2115), random)
+    {id, random} = :rand.uniform_s(Vision.Marks.ids(family), random)
     {[x, y, turn], random} = Enum.map_reduce(1..3, random, fn _, r -> :rand.uniform_s(r) end)
-    {cells, border, bits} = Native.picture(family, id - 1)
-    cell = width / border
+    picture = Vision.Marks.picture(family, id - 1)
+    {left, right} = Picture.sides(picture)
     angle = (2 * turn - 1) * @turn
-    place = {@width / 2 + x, @height / 2 + y, :math.cos(angle) / cell, :math.sin(angle) / cell}
-    # The white cell round it, and more, since it is turned.
-    reach = 1.25 * (cells / 2 + 1) * cell
+    {cosine, sine} = {:math.cos(angle), :math.sin(angle)}
+    # Its middle, which may be another than that of the square.
+    middle = width * (left + right) / 2
+    {x, y} = {@width / 2 + x - middle * cosine, @height / 2 + y - middle * sine}
+    # More than its half, since it is turned.
+    reach = 1.25 * width * max(right, picture.rows * picture.row / 2)
+    mark = {List.to_tuple(picture.edges), picture}
 
-    picture =
+    rows =
       for v <- 0..(@height - 1) do
-        for u <- 0..(@width - 1), do: pixel(u, v, place, reach, {cells, bits})
+        for u <- 0..(@width - 1), do: pixel(u, v, {x, y, cosine / width, sine / width}, reach, mark)
       end
 
-    {picture, id - 1, random}
+    {rows, id - 1, random}
   end
 
   defp pixel(u, v, {x, y, _cosine, _sine} = place, reach, mark) do
@@ -69,17 +74,23 @@ defmodule Bench.Marks do
     end
   end
 
-  defp point(dx, dy, {_x, _y, cosine, sine}, {cells, bits}) do
-    half = cells / 2 + 1
-    {column, row} = {cosine * dx + sine * dy + half, cosine * dy - sine * dx + half}
+  defp point(dx, dy, {_x, _y, cosine, sine}, {edges, picture}) do
+    across = cosine * dx + sine * dy
+    down = (cosine * dy - sine * dx) / picture.row + picture.rows / 2
+    columns = tuple_size(edges) - 1
 
     cond do
-      column < 0 or row < 0 or column >= cells + 2 or row >= cells + 2 -> @grey
-      column < 1 or row < 1 or column >= cells + 1 or row >= cells + 1 -> @white
-      :binary.at(bits, (trunc(row) - 1) * cells + trunc(column) - 1) == 0 -> @black
-      true -> @white
+      across < elem(edges, 0) or across >= elem(edges, columns) -> @grey
+      down < 0 or down >= picture.rows -> @grey
+      white?(picture.white, trunc(down) * columns + column(across, edges, 1)) -> @white
+      true -> @black
     end
   end
+
+  defp white?(white, cell), do: :binary.at(white, cell) == 1
+
+  defp column(across, edges, k) when across >= elem(edges, k), do: column(across, edges, k + 1)
+  defp column(_across, _edges, k), do: k - 1
 
   @doc "The picture in a condition, as a frame."
   @spec spoil(picture(), condition(), :rand.state()) :: {Frame.t(), :rand.state()}

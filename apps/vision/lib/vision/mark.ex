@@ -1,10 +1,10 @@
 defmodule Vision.Mark do
   @moduledoc """
-  Describes one printed square mark with an id (an AprilTag) in a frame: where it is in the picture, and where from the robot.
+  Describes one printed mark with an id (`Vision.Marks`) in a frame: where it is in the picture, and where from the robot.
 
     * `family`, `id` - what it is
     * `at_ms` - when the frame was taken, by the robot's clock
-    * `x`, `y` - its centre, and `corners` those of its border, in pixels with their centres at whole numbers: upper left, upper
+    * `x`, `y` - its centre, and `corners` those of its square, in pixels with their centres at whole numbers: upper left, upper
       right, lower right, lower left of the mark as it is printed
     * `range` - metres along the floor from the camera to its centre
     * `bearing` - radians from the robot's heading, left positive
@@ -20,7 +20,7 @@ defmodule Vision.Mark do
               [range: nil, bearing: nil, yaw: nil, range_sd: nil, bearing_sd: nil, yaw_sd: nil]
 
   @type id :: non_neg_integer()
-  @type family :: :tag36h11 | :tagStandard41h12
+  @type family :: :tag36h11 | :tagStandard41h12 | :similar
   @type point :: {x :: float(), y :: float()}
   @type t :: %__MODULE__{
           family: family(),

@@ -28,7 +28,7 @@ defmodule Lab.Trial.Memory do
   end
 
   @doc "A detector for marks, which the calling process keeps, too."
-  @spec detector(Vision.Marks.t()) :: Vision.Marks.Native.detector()
+  @spec detector(Vision.Marks.t()) :: Vision.Marks.detector()
   def detector(%Vision.Marks{family: family} = marks) do
     with nil <- Process.get({__MODULE__, family}) do
       {:ok, detector} = Vision.Marks.detector(marks)

@@ -117,11 +117,11 @@ defmodule Lab.Trial.Setup do
   defp check_marks(%{marks: nil}), do: :ok
 
   defp check_marks(%{marks: given, robots: robots}) do
-    with :ok <- Marks.available(),
-         {:ok, %{family: family}} <- Marks.new(Keyword.take(given, [:family, :size])) do
+    with {:ok, %{family: family}} <- Marks.new(Keyword.take(given, [:family, :size])),
+         :ok <- Marks.available(family) do
       borne = Keyword.get(given, :robots, [])
       ids = Enum.map(hanging(given) ++ borne, &elem(&1, 0))
-      unknown = Enum.find(ids, &(Marks.Native.picture(family, &1) == nil))
+      unknown = Enum.find(ids, &(Marks.picture(family, &1) == nil))
       stranger = Enum.find(Enum.map(borne, &elem(&1, 1)), &(&1 not in robots))
 
       cond do

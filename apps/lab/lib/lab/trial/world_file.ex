@@ -111,11 +111,11 @@ defmodule Lab.Trial.WorldFile do
   defp marks(%{marks: []}), do: {nil, []}
 
   defp marks(world) do
-    with :ok <- Vision.Marks.available(),
-         {:ok, %{family: family}} <- Vision.Marks.new(size: @mark) do
+    with {:ok, %{family: family}} <- Vision.Marks.new(size: @mark),
+         :ok <- Vision.Marks.available(family) do
       {known, odd} =
         Enum.split_with(world.marks, fn {id, _} ->
-          id <= 65_535 and Vision.Marks.Native.picture(family, id) != nil
+          id <= 65_535 and Vision.Marks.picture(family, id) != nil
         end)
 
       at = for {id, pose} <- known, do: {id, pose(pose)}

@@ -1,6 +1,6 @@
 defmodule Sim.Compute.Marks do
   @moduledoc false
-  # Paints flat square pictures that stand upright, in plain Elixir: the reference for the marks of `paint.c`. Pure.
+  # Paints flat pictures that stand upright, in plain Elixir: the reference for the marks of `paint.c`. Pure.
   alias Sim.Compute.Rays
 
   @nearest 0.05
@@ -11,10 +11,10 @@ defmodule Sim.Compute.Marks do
   # 4 x 4 points of a pixel, from its centre.
   @samples [-0.375, -0.125, 0.125, 0.375]
 
-  @typedoc "The place of its middle, the cosine and sine of where it faces, the height of its middle, and its cells: their side, how many a side, and each as a byte, not 0 is white."
+  @typedoc "Its place, the cosine and sine of where it faces, the height of the middle of its rows, their height, how many; the edges of its columns from its place, to the right, as native floats; each cell as a byte, not 0 is white."
   @type packed ::
           {x :: float(), y :: float(), cosine :: float(), sine :: float(), middle :: float(),
-           cell :: float(), cells :: pos_integer(), white :: binary()}
+           row :: float(), rows :: pos_integer(), edges :: binary(), white :: binary()}
 
   @typedoc "How many points of a pixel show a mark, and the sum of their brightness."
   @type cover :: %{{non_neg_integer(), non_neg_integer()} => {1..16, non_neg_integer()}}
@@ -65,13 +65,13 @@ defmodule Sim.Compute.Marks do
   def covered?(covers, place), do: Enum.any?(covers, &is_map_key(&1, place))
 
   defp box({sx, sy, cosine, sine, eye, focal, horizon, width, height}, mark) do
-    {x, y, mark_cosine, mark_sine, middle, cell, cells, _white} = mark
-    half = cells * cell / 2
+    {x, y, mark_cosine, mark_sine, middle, row, rows, edges, _white} = mark
+    half = rows * row / 2
 
     ends =
-      for side <- [-1, 1] do
-        dx = x - side * half * mark_sine - sx
-        dy = y + side * half * mark_cosine - sy
+      for edge <- [hd(edges(edges)), List.last(edges(edges))] do
+        dx = x - edge * mark_sine - sx
+        dy = y + edge * mark_cosine - sy
         depth = cosine * dx + sine * dy
 
         if depth >= @nearest do
@@ -95,7 +95,7 @@ defmodule Sim.Compute.Marks do
   end
 
   # The depth at which a ray meets the front of the mark's plane.
-  defp front(sight, {x, y, cosine, sine, _, _, _, _}, rx, ry) do
+  defp front(sight, {x, y, cosine, sine, _, _, _, _, _}, rx, ry) do
     ahead = (x - elem(sight, 0)) * cosine + (y - elem(sight, 1)) * sine
     along = rx * cosine + ry * sine
     if along < -@edge and ahead < 0.0, do: ahead / along
@@ -116,32 +116,40 @@ defmodule Sim.Compute.Marks do
     end
   end
 
-  # For each point of a pixel's row: the depth, and the cell across.
+  # For each point of a pixel's row: the depth, and the column.
   defp across({sx, sy, _, _, _, _, _, _, _} = sight, mark, column) do
-    {x, y, cosine, sine, _middle, cell, cells, _white} = mark
+    {x, y, cosine, sine, _middle, _row, _rows, edges, _white} = mark
+    edges = edges(edges)
 
     for point <- @samples do
       {rx, ry} = ray(sight, column + point)
 
       with depth when depth != nil <- front(sight, mark, rx, ry) do
         {dx, dy} = {sx + rx * depth - x, sy + ry * depth - y}
-        {depth, cell((dy * cosine - dx * sine) / cell + cells / 2, cells)}
+        {depth, column(dy * cosine - dx * sine, edges)}
       end
     end
   end
 
   defp points({_, _, _, _, eye, focal, horizon, _, _}, mark, across, row) do
-    {_x, _y, _cosine, _sine, middle, cell, cells, white} = mark
+    {_x, _y, _cosine, _sine, middle, row_height, rows, edges, white} = mark
+    columns = div(byte_size(edges), 8) - 1
 
     lumas =
       for point <- @samples,
           {depth, column} when column != nil <- across,
           height = eye + (horizon - (row + point)) * depth / focal,
-          down = cell((middle - height) / cell + cells / 2, cells),
-          do: if(:binary.at(white, down * cells + column) == 0, do: @black, else: @white)
+          down = row((middle - height) / row_height + rows / 2, rows),
+          do: if(:binary.at(white, down * columns + column) == 0, do: @black, else: @white)
 
     if lumas != [], do: {length(lumas), Enum.sum(lumas)}
   end
 
-  defp cell(at, cells), do: if(at >= 0.0 and at < cells, do: trunc(at))
+  defp edges(binary), do: for(<<edge::float-native <- binary>>, do: edge)
+
+  defp column(at, [first | edges]) do
+    if at >= first and at < List.last(edges), do: Enum.find_index(edges, &(at < &1))
+  end
+
+  defp row(at, rows), do: if(at >= 0.0 and at < rows, do: trunc(at))
 end

@@ -2,7 +2,7 @@ defmodule Sim.World.Mark do
   @moduledoc """
   Describes a printed mark with an id that hangs in a world: flat and upright, one side printed. Pure.
 
-  It needs libapriltag, which knows the pictures of the ids (`Vision.Marks.available/0`). It is no obstacle. Hang it a little
+  An AprilTag needs libapriltag, which knows the pictures of the ids (`Vision.Marks.available/1`). It is no obstacle. Hang it a little
   before its wall: what is in the wall is hidden. A robot may bear one on its back.
   """
   alias Hal.{Options, Pose}
@@ -23,7 +23,7 @@ defmodule Sim.World.Mark do
   @enforce_keys Keyword.keys(@table) ++ [:packed]
   defstruct @enforce_keys
 
-  @typedoc "`pose` is the place of its middle, and where it faces, `nil` of one on the back of a `robot`; `height` that of its middle; `size` the side of its border, in metres."
+  @typedoc "`pose` is the place of its middle, and where it faces, `nil` of one on the back of a `robot`; `height` that of its middle; `size` the side of its square, in metres."
   @type t :: %__MODULE__{
           family: Vision.Mark.family(),
           id: non_neg_integer(),
@@ -38,9 +38,9 @@ defmodule Sim.World.Mark do
   @spec new!(keyword()) :: t()
   def new!(options) do
     options = Options.check!(options, @table, "mark")
-    with {:error, line} <- Marks.available(), do: raise(ArgumentError, line)
+    with {:error, line} <- Marks.available(options[:family]), do: raise(ArgumentError, line)
 
-    case Marks.Native.picture(options[:family], options[:id]) do
+    case Marks.picture(options[:family], options[:id]) do
       nil ->
         raise ArgumentError, "mark option id: #{options[:family]} has no mark #{options[:id]}"
 
@@ -49,8 +49,8 @@ defmodule Sim.World.Mark do
     end
   end
 
-  @doc "The same with another picture (`Vision.Marks.Native.picture/2`) than that of its id."
-  @spec painted!(keyword(), {pos_integer(), pos_integer(), binary()}) :: t()
+  @doc "The same with another picture (`Vision.Marks.picture/2`) than that of its id."
+  @spec painted!(keyword(), Marks.Picture.t()) :: t()
   def painted!(options, picture) do
     mark = options |> Options.check!(@table, "mark") |> Map.new()
     struct!(__MODULE__, Map.put(mark, :packed, packed(mark, picture)))
@@ -64,18 +64,16 @@ defmodule Sim.World.Mark do
     {pose, radius} = where.(robot)
     pose = Pose.compose(pose, Pose.new(-radius - @before, 0.0, :math.pi()))
     {cosine, sine} = Sim.Trig.cos_sin(pose.heading)
-    {_x, _y, _cosine, _sine, height, cell, cells, white} = packed
-    %{mark | pose: pose, packed: {pose.x, pose.y, cosine, sine, height, cell, cells, white}}
+    {_x, _y, _cosine, _sine, height, row, rows, edges, white} = packed
+    %{mark | pose: pose, packed: {pose.x, pose.y, cosine, sine, height, row, rows, edges, white}}
   end
 
-  # With the white cells round it that it is printed with.
-  defp packed(%{pose: pose} = mark, {cells, border, picture}) do
+  defp packed(%{pose: pose, size: size} = mark, picture) do
     pose = pose || Pose.new(0.0, 0.0)
     {cosine, sine} = Sim.Trig.cos_sin(pose.heading)
-    edge = :binary.copy(<<1>>, cells + 2)
-    rows = for <<row::binary-size(cells) <- picture>>, into: <<>>, do: <<1, row::binary, 1>>
+    edges = for edge <- picture.edges, into: <<>>, do: <<edge * size::float-native>>
 
-    {pose.x, pose.y, cosine, sine, mark.height * 1.0, mark.size / border, cells + 2,
-     edge <> rows <> edge}
+    {pose.x, pose.y, cosine, sine, mark.height * 1.0, picture.row * size, picture.rows, edges,
+     picture.white}
   end
 end

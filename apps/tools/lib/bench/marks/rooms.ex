@@ -5,7 +5,8 @@ defmodule Bench.Marks.Rooms do
   """
   alias Hal.{Pose, Profile}
   alias Sim.{Floorplan, World}
-  alias Vision.Marks.Native
+  alias Vision.Marks
+  alias Vision.Marks.Picture
 
   @size 0.2
   # Squares of other codes in a picture, and how many cells wide those are.
@@ -56,7 +57,7 @@ defmodule Bench.Marks.Rooms do
             <<if(inside?, do: rem(byte, 2), else: 0)>>
           end
 
-        {mark, _hung, random} = hang(world, 0, {@cells, @cells, bits}, random)
+        {mark, _hung, random} = hang(world, 0, Picture.square({@cells, @cells, bits}), random)
         {mark, random}
       end)
 
@@ -68,8 +69,8 @@ defmodule Bench.Marks.Rooms do
           {World.t(), hung(), :rand.state()}
   def marked(world, family, random) do
     {world, random} = empty(world, random)
-    {id, random} = :rand.uniform_s(if(family == :tag36h11, do: 587, else: 2115), random)
-    {mark, hung, random} = hang(world, id - 1, Native.picture(family, id - 1), random)
+    {id, random} = :rand.uniform_s(Marks.ids(family), random)
+    {mark, hung, random} = hang(world, id - 1, Marks.picture(family, id - 1), random)
     {%{world | marks: [mark]}, hung, random}
   end
 

@@ -26,7 +26,7 @@ defmodule Bench.Marks.Runner do
   def found(family, pictures, seed, note) do
     {marks, detector} = detector(family)
 
-    for width <- Marks.widths() do
+    for width <- Marks.widths(family) do
       note.("#{width} pixels")
       random = :rand.seed_s(:exsss, {seed, width, 0})
 

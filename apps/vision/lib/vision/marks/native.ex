@@ -11,9 +11,6 @@ defmodule Vision.Marks.Native do
 
   @families %{tag36h11: 0, tagStandard41h12: 1}
   @formats %{yuyv: 0, i420: 1, nv12: 2}
-  # As in marks.h.
-  @least 16
-  @most 32_767
 
   @typedoc "A detector of one family. Garbage collection frees it."
   @opaque detector :: {Vision.Mark.family(), reference()}
@@ -27,32 +24,12 @@ defmodule Vision.Marks.Native do
 
   @doc """
   What is found in a part of a frame: `{left, top, right, bottom}`, its first column and row, and those behind its last. Pixels
-  are those of the frame. A part of less than 16 pixels shows nothing. The error is `{:format, format}`, or `:memory`.
+  are those of the part. Formats and sizes that `Vision.Marks` refuses raise `ArgumentError`.
   """
   @spec search(detector(), Frame.t(), Vision.Marks.Schedule.box()) ::
-          {:ok, [found()]} | {:error, term()}
-  def search(_detector, %Frame{format: format}, _box) when not is_map_key(@formats, format),
-    do: {:error, {:format, format}}
-
-  def search(_detector, _frame, {left, top, right, bottom})
-      when right - left < @least or bottom - top < @least,
-      do: {:ok, []}
-
-  def search(_detector, %Frame{width: width, height: height}, _box)
-      when width > @most or height > @most,
-      do: {:error, {:size, {width, height}}}
-
-  def search({_family, kept}, %Frame{format: format} = frame, {left, top, _, _} = box) do
-    with {:ok, found} <-
-           find(kept, @formats[format], frame.width, frame.height, frame.bytes, box) do
-      move = fn {x, y} -> {x + left, y + top} end
-
-      {:ok,
-       for {id, wrong_bits, margin, centre, corners} <- found do
-         {id, wrong_bits, margin, move.(centre), Enum.map(corners, move)}
-       end}
-    end
-  end
+          {:ok, [found()]} | {:error, :memory}
+  def search({_family, kept}, %Frame{format: format} = frame, box),
+    do: find(kept, @formats[format], frame.width, frame.height, frame.bytes, box)
 
   @doc """
   The picture of a mark: how many cells it is wide, how many of these the square between its corners is, and its cells row by
