@@ -8,7 +8,15 @@ defmodule Vision.MixProject do
       native: [
         nifs: [
           blobs: ["blobs.c", "runs.c", "masks.c", "blobs_nif.c"],
-          similar: ["similar.c", "similar_read.c", "blobs.c", "runs.c", "masks.c", "marks_terms.c", "similar_nif.c"]
+          similar: [
+            "similar.c",
+            "similar_read.c",
+            "blobs.c",
+            "runs.c",
+            "masks.c",
+            "marks_terms.c",
+            "similar_nif.c"
+          ]
         ],
         optional: [
           marks:

@@ -5,7 +5,7 @@
 #include "similar.h"
 
 /* Edges that are looked for; each with its neighbours. */
-enum { FIRST_EDGE = 1, LAST_EDGE = 9, ROUNDS = 3, TERMS = 5, TRACES = 9, LEAST_TRACES = 5, CELLS = 8 };
+enum { FIRST_EDGE = 1, LAST_EDGE = 9, ROUNDS = 5, TERMS = 5, TRACES = 9, LEAST_TRACES = 5, CELLS = 8 };
 
 /* x (to the right) and y (down) of the picture are u and v here: pattern widths from a point of the line of origins. The
    place in the pattern is t = (a u + b v + c) / (d u + e v + 1), as a plane seen in perspective has it. */
@@ -87,43 +87,36 @@ static int solve(double a[TERMS][TERMS + 1], double x[TERMS])
     return 1;
 }
 
-/* Fits the pattern to the edges in all rows. */
-static int refine(struct reader *reader)
+/* The sums of a fit of the pattern to edges, how many were looked for, and how many were met. */
+struct sums {
+    double a[TERMS][TERMS + 1];
+    int64_t looked, met;
+};
+
+/* Looks in a row for the edge at t, beyond which it is brighter (sign 1) or darker (-1); the next ones are at t + `right` and
+   t - `left`. */
+static void add(const struct reader *reader, double t, double left, double right, int64_t y, double sign,
+                struct sums *sums)
 {
-    const struct similar_chain *chain = reader->chain;
-    double a[TERMS][TERMS + 1] = { { 0.0 } }, m[TERMS];
-    int64_t looked = 0, met = 0;
+    double here = column(reader, t, (double)y), most = 3.0 * (double)reader->chain->scale, at;
+    double before = here - column(reader, t - left, (double)y), behind = column(reader, t + right, (double)y) - here;
+    double half = (before < behind ? before : behind) / 2.0;
 
-    /* Hardly any pull to a view without perspective, for marks of a few pixels. */
-    a[3][3] = a[4][4] = 0.002;
-    for (int64_t y = chain->first; y <= chain->last && y < (int64_t)reader->luma->height; y += chain->scale)
-        for (int k = FIRST_EDGE; k <= LAST_EDGE; k++) {
-            double t = similar_edges[k], here = column(reader, t, (double)y);
-            double left = here - column(reader, similar_edges[k + 1], (double)y);
-            double right = column(reader, similar_edges[k - 1], (double)y) - here;
-            double half = (left < right ? left : right) / 2.0, most = 3.0 * (double)chain->scale, at;
+    if (half < 0.9)
+        return;
+    half = half < most ? half : most;
+    int64_t from = (int64_t)floor(here - half + 0.5), to = (int64_t)floor(here + half + 0.5);
 
-            if (half < 0.9)
-                continue;
-            half = half < most ? half : most;
-            int64_t from = (int64_t)floor(here - half + 0.5), to = (int64_t)floor(here + half + 0.5);
+    sums->looked++;
+    if (to - from < 2 || !edge(reader, from, to, y, sign, &at) || fabs(at - here) > half)
+        return;
+    sums->met++;
+    double u = (at - reader->x) / reader->chain->width, v = ((double)y - reader->y) / reader->chain->width;
+    const double row[TERMS + 1] = { u, v, 1.0, -t * u, -t * v, t };
 
-            looked++;
-            if (to - from < 2 || !edge(reader, from, to, y, k % 2 ? -1.0 : 1.0, &at) || fabs(at - here) > half)
-                continue;
-            met++;
-            double u = (at - reader->x) / chain->width, v = ((double)y - reader->y) / chain->width;
-            const double row[TERMS + 1] = { u, v, 1.0, -t * u, -t * v, t };
-
-            for (int i = 0; i < TERMS; i++)
-                for (int j = 0; j <= TERMS; j++)
-                    a[i][j] += row[i] * row[j];
-        }
-    if (met < 12 || 2 * met < looked || !solve(a, m) || !sound(m))
-        return 0;
-    for (int k = 0; k < TERMS; k++)
-        reader->m[k] = m[k];
-    return 1;
+    for (int i = 0; i < TERMS; i++)
+        for (int j = 0; j <= TERMS; j++)
+            sums->a[i][j] += row[i] * row[j];
 }
 
 /* The mean luma along the pattern's line at t, in the rows of the chain; -1 if it leaves the picture. */
@@ -155,11 +148,39 @@ static int levels(struct reader *reader)
     return reader->contrast >= 10.0;
 }
 
+/* Fits the pattern to the edges in all rows: those of the stripes, and so many of the barcode's as differ. */
+static int refine(struct reader *reader, int cells)
+{
+    const struct similar_chain *chain = reader->chain;
+    struct sums sums = { 0 };
+    double m[TERMS], cell[CELLS + 2];
+
+    for (int k = 0; k <= cells; k++)
+        cell[k] = mean(reader, 1.15 + 0.1 * (double)k) < reader->threshold ? -1.0 : 1.0;
+    /* Hardly any pull to a view without perspective, for marks of a few pixels. */
+    sums.a[3][3] = sums.a[4][4] = 0.002;
+    for (int64_t y = chain->first; y <= chain->last && y < (int64_t)reader->luma->height; y += chain->scale) {
+        for (int k = FIRST_EDGE; k <= LAST_EDGE; k++) {
+            const double *t = similar_edges + k;
+
+            add(reader, t[0], t[0] - t[1], t[-1] - t[0], y, k % 2 ? -1.0 : 1.0, &sums);
+        }
+        for (int k = 0; k < cells; k++)
+            if (cell[k] != cell[k + 1])
+                add(reader, 1.2 + 0.1 * (double)k, 0.1, 0.1, y, cell[k + 1], &sums);
+    }
+    if (sums.met < 12 || 2 * sums.met < sums.looked || !solve(sums.a, m) || !sound(m))
+        return 0;
+    for (int k = 0; k < TERMS; k++)
+        reader->m[k] = m[k];
+    return 1;
+}
+
 /* Where the black at t ends, from the middle row upwards (step -1) or downwards. */
 static int trace(const struct reader *reader, double t, int64_t step, double *u, double *v)
 {
     const struct marks_luma *luma = reader->luma;
-    const int64_t scale = reader->chain->scale, around = 2 * scale;
+    const int64_t scale = reader->chain->scale;
     int64_t y = (int64_t)floor(reader->y), white = 0;
     double before = sample(luma, column(reader, t, (double)y), y), sum = 0.0;
 
@@ -174,7 +195,7 @@ static int trace(const struct reader *reader, double t, int64_t step, double *u,
         white = value >= reader->threshold ? white + 1 : 0;
     }
     /* The first white row is one back. */
-    int64_t from = y - step - step * (around + 1), to = y - step + step * around;
+    int64_t from = y - step - step * (2 * scale + 1), to = y - step + step * scale;
     double first = sample(luma, column(reader, t, (double)from), from), value = first;
 
     if (first < 0.0)
@@ -305,8 +326,9 @@ static int code(const struct reader *reader)
         if (wide >= 2.0 && majority(reader, (left + right) / 2.0) != 1 - k % 2)
             return -1;
     }
-    if (majority(reader, -0.05) != 0 || majority(reader, 1.05) != 0 || majority(reader, 1.15) != 1 ||
-        majority(reader, 2.05) != 0)
+    /* The white at the sides may be less than a pixel wide. */
+    if (majority(reader, -0.05) == 1 || majority(reader, 1.05) != 0 || majority(reader, 1.15) != 1 ||
+        majority(reader, 2.05) == 1)
         return -1;
     for (int k = 0; k < CELLS; k++) {
         int black = majority(reader, 1.25 + 0.1 * (double)k);
@@ -338,6 +360,8 @@ static int whole(const double corners[4][2])
 
 int similar_read(const struct marks_luma *luma, const struct similar_chain *chain, struct marks_found *found)
 {
+    /* The farther the pattern is known, the farther it can be followed. */
+    static const int reaches[ROUNDS] = { 0, 0, 3, 6, CELLS + 1 };
     static const double sides[4] = { 0.0, 1.0, 1.0, 0.0 };
     struct reader reader = { .luma = luma, .chain = chain };
     int64_t last = chain->last < (int64_t)luma->height ? chain->last : (int64_t)luma->height - 1;
@@ -349,9 +373,9 @@ int similar_read(const struct marks_luma *luma, const struct similar_chain *chai
     if (!sound(reader.m))
         return 0;
     for (int k = 0; k < ROUNDS; k++)
-        if (!refine(&reader))
+        if (!refine(&reader, reaches[k]) || !levels(&reader))
             return 0;
-    if (!levels(&reader) || !end(&reader, 0) || !end(&reader, 1))
+    if (!end(&reader, 0) || !end(&reader, 1))
         return 0;
     for (int k = 0; k < 4; k++) {
         double u, v;

@@ -55,7 +55,8 @@ defmodule Bench.Marks do
 
     rows =
       for v <- 0..(@height - 1) do
-        for u <- 0..(@width - 1), do: pixel(u, v, {x, y, cosine / width, sine / width}, reach, mark)
+        for u <- 0..(@width - 1),
+            do: pixel(u, v, {x, y, cosine / width, sine / width}, reach, mark)
       end
 
     {rows, id - 1, random}

@@ -61,7 +61,7 @@ defmodule Vision.Marks do
   @spec ids(Mark.family()) :: pos_integer()
   def ids(:tag36h11), do: 587
   def ids(:tagStandard41h12), do: 2115
-  def ids(:similar), do: Similar.ids()
+  def ids(:similar), do: Similar.Pattern.ids()
 
   @doc "Whether marks of a family can be found and drawn here, or in one line why not."
   @spec available(Mark.family()) :: :ok | {:error, line :: String.t()}
@@ -78,7 +78,7 @@ defmodule Vision.Marks do
 
   @doc "The picture of a mark of a family that is available; `nil` if it has no such id."
   @spec picture(Mark.family(), Mark.id()) :: Picture.t() | nil
-  def picture(:similar, id), do: Similar.picture(id)
+  def picture(:similar, id), do: Similar.Pattern.picture(id)
 
   def picture(family, id) do
     with {_cells, _border, _bits} = picture <- Native.picture(family, id),
