@@ -81,7 +81,7 @@
   # distance is the share of the picture that a thing fills which is 1 m away.
   colours: "landmark.txt",
 
-  # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none. The size is the
+  # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none; :similar needs no library. The size is the
   # side of the square between the corners, in metres. known: [{7, {2.0, 1.5, deg(90)}}] says where some hang and face that the
   # map does not name, robots: [{11, :mag2}] which robots bear them on their backs.
   marks: nil,

@@ -5,7 +5,7 @@
 #include "similar.h"
 
 /* Edges that are looked for; each with its neighbours. */
-enum { FIRST_EDGE = 1, LAST_EDGE = 9, ROUNDS = 5, TERMS = 5, TRACES = 9, LEAST_TRACES = 5, CELLS = 8 };
+enum { FIRST_EDGE = 1, LAST_EDGE = 9, ROUNDS = 5, TERMS = 5, TRACES = 9, LEAST_TRACES = 5, CELLS = 8, LEAST_WIDE = 20 };
 
 /* x (to the right) and y (down) of the picture are u and v here: pattern widths from a point of the line of origins. The
    place in the pattern is t = (a u + b v + c) / (d u + e v + 1), as a plane seen in perspective has it. */
@@ -342,20 +342,26 @@ static int code(const struct reader *reader)
         int a = id >> 3 & 1, b = id >> 2 & 1, c = id >> 1 & 1, d = id & 1;
         int p = a ^ b ^ d, q = a ^ c ^ d, r = b ^ c ^ d;
 
-        if (word == (p << 7 | q << 6 | a << 5 | r << 4 | b << 3 | c << 2 | d << 1 | (p ^ q ^ a ^ r ^ b ^ c ^ d)))
+        int even = p ^ q ^ a ^ r ^ b ^ c ^ d;
+
+        if (word == ((p << 7 | q << 6 | a << 5 | r << 4 | b << 3 | c << 2 | d << 1 | even) ^ 3))
             return id;
     }
     return -1;
 }
 
-/* The square is at least about as high as it seems to be wide: else a part of it is hidden. */
-static int whole(const double corners[4][2])
+/* Cells of the barcode are two pixels wide. The square is at least about as high as it seems to be wide: else a part of it is
+   hidden. It is higher where the stripes say that it is nearer: heights go with 1 + d u. */
+static int whole(const struct reader *reader, const double corners[4][2])
 {
+    double width = reader->chain->width, d = reader->m[3];
+    double first = 1.0 + d * ((corners[0][0] + corners[3][0]) / 2.0 - reader->x) / width;
+    double second = 1.0 + d * ((corners[1][0] + corners[2][0]) / 2.0 - reader->x) / width;
     double wide = (corners[1][0] + corners[2][0] - corners[0][0] - corners[3][0]) / 2.0;
     double left = corners[3][1] - corners[0][1], right = corners[2][1] - corners[1][1];
 
-    return left > 0.0 && right > 0.0 && wide > 0.0 && left + right >= 1.8 * wide && left + right <= 6.0 * wide &&
-           left < 1.7 * right && right < 1.7 * left;
+    return left > 0.0 && right > 0.0 && wide >= LEAST_WIDE && left + right >= 1.8 * wide && left + right <= 6.0 * wide &&
+           left * second < 1.2 * right * first && right * first < 1.2 * left * second;
 }
 
 int similar_read(const struct marks_luma *luma, const struct similar_chain *chain, struct marks_found *found)
@@ -385,7 +391,7 @@ int similar_read(const struct marks_luma *luma, const struct similar_chain *chai
         found->corners[k][0] = reader.x + chain->width * u;
         found->corners[k][1] = reader.y + chain->width * v;
     }
-    if (!whole(found->corners) || !quiet(&reader))
+    if (!whole(&reader, found->corners) || !quiet(&reader))
         return 0;
     found->id = code(&reader);
     found->hamming = 0;

@@ -10,7 +10,7 @@ defmodule Vision.BlobDetector do
       `apply(m, f, a ++ [{:detections, detections}])` with the frame's `Vision.Detections`, even
       if there are no blobs
     * `:marks` - the `Vision.Marks` to look for; `nil` (the default) for none. Without the library
-      (`Vision.Marks.available/0`) the detections have none, and `status/1` says why
+      (`Vision.Marks.available/1`) the detections have none, and `status/1` says why
     * `:backend` - a `Vision.Backend`; by default the one that `Vision.blobs/4` selects
     * `:ptz` - `true`: the camera is on a pan-tilt unit, whose readings are passed to `aim/2`
     * `:clock` - `{m, f, a}` that returns integer milliseconds, by the clock of the frames

@@ -104,7 +104,7 @@ defmodule Vision.Marks do
     with {part, boxes} <- Schedule.plan(schedule, frame.at_ms, {frame.width, frame.height}),
          {:ok, found} <- search(boxes, detector, frame, []) do
       seen =
-        for {id, _wrong_bits, margin, {x, y}, corners} <- Enum.sort(found),
+        for {id, _wrong_bits, margin, {x, y}, corners} <- Enum.sort_by(found, &place/1),
             margin >= @least_margin,
             {:ok, mark} <- [reading(marks, id, corners, frame)],
             do: %{mark | x: x, y: y}
@@ -177,6 +177,8 @@ defmodule Vision.Marks do
       :edge
     end
   end
+
+  defp place({id, _wrong_bits, _margin, centre, _corners}), do: {id, centre}
 
   defp clear?({x, y}, width, height) do
     x >= @edge_px and y >= @edge_px and x <= width - 1 - @edge_px and

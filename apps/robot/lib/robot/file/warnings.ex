@@ -78,8 +78,8 @@ defmodule Robot.File.Warnings do
   # The file may be checked on another machine than the robot's.
   defp markless(%{marks: nil}), do: []
 
-  defp markless(_robot) do
-    case Vision.Marks.available() do
+  defp markless(%{marks: marks}) do
+    case Vision.Marks.available(Keyword.get(marks, :family, :tag36h11)) do
       :ok -> []
       {:error, line} -> ["marks: #{line}; without it this robot sees none"]
     end

@@ -4,14 +4,17 @@ defmodule Sim.World.MarkReadings do
   # compare it with painting. Pure.
   #
   # A mark is read if it faces the camera, is whole in the picture and wide enough, and nothing stands before its middle or its
-  # sides. Its corners are off by what a detector's are, so that range, bearing and yaw have the errors, and the doubts, of
+  # sides, or the end of its barcode. Its corners are off by what a detector's are, so that range, bearing and yaw have the errors, and the doubts, of
   # those in pictures (`Vision.Marks.Pose`).
   alias Sim.{Compute, Noise}
   alias Sim.Compute.{CameraFrustum, Columns, Rays}
   alias Vision.Marks
 
   # What 20 pixels of a `tag36h11` are for a `tagStandard41h12`, whose square is 5 cells wide instead of 8.
-  @wide_px [tag36h11: 20.0, tagStandard41h12: 14.0]
+  # A self-similar mark has cells of a tenth of its square.
+  @wide_px [tag36h11: 20.0, tagStandard41h12: 14.0, similar: 24.0]
+  # The end of a self-similar mark's barcode, in squares from its middle.
+  @code_end 1.5
   @corner_px 0.2
   # A wall nearer than the mark by this (metres) hides it; depths below the nearest are behind the camera.
   @before 1.0e-6
@@ -36,7 +39,9 @@ defmodule Sim.World.MarkReadings do
         {[left, right] = sides, corners} <- [corners(sight, mark)],
         wide?(corners, mark.family),
         middle = {(elem(left, 0) + elem(right, 0)) / 2, (elem(left, 1) + elem(right, 1)) / 2},
-        Enum.all?([middle | sides], &free?(map, sight, poles, &1, corners)),
+        code = code(mark),
+        Enum.all?(code, &inside?(sight, &1)),
+        Enum.all?([middle | sides] ++ code, &free?(map, sight, poles, &1, corners)),
         looked_for = %Marks{family: mark.family, size: mark.size},
         corners = noisy(corners, noise, k),
         {:ok, reading} <- [Marks.reading(looked_for, mark.id, corners, frame)] do
@@ -59,6 +64,20 @@ defmodule Sim.World.MarkReadings do
            do: {sides, [ul, ur, lr, ll]},
            else: (_behind -> nil)
     end
+  end
+
+  defp code(%{family: :similar, pose: pose, size: size}) do
+    {c, s} = Sim.Trig.cos_sin(pose.heading)
+    [{pose.x - @code_end * size * s, pose.y + @code_end * size * c}]
+  end
+
+  defp code(_apriltag), do: []
+
+  defp inside?(sight, place) do
+    {aside, depth} = seen(sight, place)
+
+    depth >= @nearest and
+      abs(sight.focal * aside / depth) <= (sight.width - 1) / 2
   end
 
   defp seen(sight, {x, y}) do

@@ -13,9 +13,9 @@ defmodule Bench.Marks.Main do
 
   defp measure(given) do
     case {Marks.available(), given} do
-      {{:error, line}, _given} -> {:error, [line]}
       {:ok, %{"round" => map}} -> round(map, given)
-      {:ok, _given} -> measured(given)
+      {{:error, line}, %{"round" => _map}} -> {:error, [line]}
+      {_available, _given} -> measured(given)
     end
   end
 
@@ -106,7 +106,7 @@ defmodule Bench.Marks.Main do
 
     {_none, about} =
       Command.loaded(fn output ->
-        for family <- Marks.families() do
+        for family <- Marks.families(), there?(family) do
           note = &Command.note(output).("#{family}, #{&1}")
           IO.puts("\n#{family}\n")
           found = Runner.found(family, pictures, seed, note)
@@ -127,6 +127,15 @@ defmodule Bench.Marks.Main do
       "\n#{pictures} pictures a cell, of 160x120; the others of simulated rooms (#{Enum.join(@maps, ", ")}), 320x240, " <>
         "with marks of #{Rooms.size()} m; seed #{seed}. #{Load.words(about)}."
     )
+  end
+
+  defp there?(family) do
+    with {:error, line} <- Marks.available(family) do
+      IO.puts("\n#{family}: #{line}")
+      false
+    else
+      :ok -> true
+    end
   end
 
   defp shares({width, shares}), do: ["#{width}" | Enum.map(shares, &"#{round(100 * &1)}")]

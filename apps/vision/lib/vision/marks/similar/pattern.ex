@@ -7,7 +7,8 @@ defmodule Vision.Marks.Similar.Pattern do
   The square between the corners has side 1; t runs from its left side, where the stripes vanish, to its right side. Edges of
   stripes are at (2/3)^(k/2), and the rightmost stripe is black. The barcode follows: a white gap of 0.1, a black bar of 0.1, and
   eight cells of 0.1, black for 1. They are a word of the extended Hamming code of length 8, in which any two words differ in
-  four cells (R. Hamming, "Error detecting and error correcting codes", 1950). There are 16 ids. White of 0.1 is all round.
+  four cells (R. Hamming, "Error detecting and error correcting codes", 1950), with its last two cells turned round: so each has
+  two to six black ones, and a bare wall is none. There are 16 ids. White of 0.1 is all round.
   """
   import Bitwise
   alias Vision.Marks.Picture
@@ -37,7 +38,7 @@ defmodule Vision.Marks.Similar.Pattern do
   The cells of an id's barcode from the left, 1 for black.
 
       iex> Vision.Marks.Similar.Pattern.code(5)
-      [0, 1, 0, 0, 1, 0, 1, 1]
+      [0, 1, 0, 0, 1, 0, 0, 0]
       iex> words = for id <- 0..15, do: Vision.Marks.Similar.Pattern.code(id)
       iex> for(a <- words, b <- words, a != b, do: Enum.zip(a, b) |> Enum.count(fn {x, y} -> x != y end)) |> Enum.min()
       4
@@ -45,8 +46,8 @@ defmodule Vision.Marks.Similar.Pattern do
   @spec code(0..15) :: [0..1, ...]
   def code(id) when id in 0..(@codes - 1) do
     [a, b, c, d] = for shift <- 3..0//-1, do: id >>> shift &&& 1
-    word = [bxor(bxor(a, b), d), bxor(bxor(a, c), d), a, bxor(bxor(b, c), d), b, c, d]
-    word ++ [rem(Enum.sum(word), 2)]
+    word = [bxor(bxor(a, b), d), bxor(bxor(a, c), d), a, bxor(bxor(b, c), d), b, c]
+    word ++ [1 - d, 1 - rem(Enum.sum(word) + d, 2)]
   end
 
   @doc """

@@ -3,7 +3,7 @@ defmodule Vision.Marks.Similar.Reference do
   # Finds self-similar marks in plain Elixir, operation by operation as `similar.c` does. Pure.
   import Bitwise
   alias Hal.Frame
-  alias Vision.Marks.Similar.{Pattern, Reading}
+  alias Vision.Marks.Similar.{Fit, Pattern, Reading}
 
   # As in similar.c.
   @window 24
@@ -31,7 +31,7 @@ defmodule Vision.Marks.Similar.Reference do
   end
 
   @doc "The luma of a part of a frame."
-  @spec luma(Frame.t(), Vision.Marks.Schedule.box()) :: Reading.luma()
+  @spec luma(Frame.t(), Vision.Marks.Schedule.box()) :: Fit.luma()
   def luma(%Frame{format: format, width: width, bytes: bytes}, {left, top, right, bottom}) do
     step = if format == :yuyv, do: 2, else: 1
 
