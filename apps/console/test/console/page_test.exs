@@ -167,7 +167,7 @@ defmodule Console.PageTest do
 
     test "robots and balls are dragged in the simulation; where there is no room, they stay, and a line says so" do
       world = Path.expand("../../../../examples/stage/yard.world", __DIR__)
-      {options, live} = trial("--world #{world} --mission teleop --blobs direct")
+      {options, live} = trial(["--world", world | ~w(--mission teleop --blobs direct)])
       {_page, url} = page(options, Live.Trial, live)
       browser = open(url)
       Browser.await(browser, "return document.querySelectorAll('#robots tr').length === 4")

@@ -16,9 +16,11 @@ defmodule Console.PageCase do
     end
   end
 
-  @doc "The options of a demo, as they are typed."
-  def options(line) do
-    {:ok, options} = line |> OptionParser.split() |> Options.parse()
+  @doc "The options of a demo, as they are typed; a list of words where one is a path."
+  def options(line) when is_binary(line), do: line |> OptionParser.split() |> options()
+
+  def options(words) do
+    {:ok, options} = Options.parse(words)
     options
   end
 

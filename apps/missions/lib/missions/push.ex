@@ -192,10 +192,10 @@ defmodule Missions.Push do
   # Beside robots that hide it, a box may show too little to begin with.
   defp adopt(mission, nil), do: mission
 
-  defp adopt(mission, pose) do
+  defp adopt(mission, {pose, sd}) do
     if Estimate.sure?(mission.box) or mission.stage != :none,
       do: mission,
-      else: %{mission | box: Estimate.adopt(pose, mission.size, mission.now_ms)}
+      else: %{mission | box: Estimate.adopt(pose, sd, mission.size, mission.now_ms)}
   end
 
   defp forget(mission) do

@@ -104,7 +104,8 @@ defmodule Missions.PushTest do
   describe "what they tell" do
     test "is read as it was meant, and fits its table" do
       {:idle, mission, []} = Push.init(:mag1, options())
-      box = Estimate.adopt(@box, @size, 1_000)
+      box = Estimate.adopt(@box, 0.25, @size, 1_000)
+      assert Estimate.margin(box) > 0.5
       seen = sighting({0.0, 0.5}, without: :right)
       mission = %{mission | box: box, now_ms: 1_200, sighting: seen, side: 1, direction: 0.5}
       body = Talk.body(mission, %{1 => 2.5})
@@ -114,7 +115,8 @@ defmodule Missions.PushTest do
       assert %{side: 1, direction: 0.5, costs: %{1 => 2.5}} = Talk.peer(said, 1_300)
       assert %{right: nil, left: left} = Talk.sighting(said)
       assert_in_delta left, seen.left, 0.001
-      assert Pose.distance(Talk.box(said), @box) < 0.002
+      assert {told, 0.25} = Talk.box(said)
+      assert Pose.distance(told, @box) < 0.002
       # What is not known is not told.
       none = Map.new(Talk.body(%{mission | box: nil, sighting: nil, side: nil}, %{}))
       assert {Talk.sighting(none), Talk.box(none), Talk.peer(none, 0).costs} == {nil, nil, %{}}

@@ -30,7 +30,7 @@ defmodule Sim.Stage do
            boundary? :: boolean()}
           | {:polygon, [Pose.point()]}
 
-  @typedoc "Balls are `{x, y, radius}`, boxes `{pose, length, width}`, marks `{id, pose}`; `notes` are lines."
+  @typedoc "Balls are `{x, y, radius}`, boxes `{pose, length, width}`, marks `{id, pose, where the file says so}`; `notes` are lines."
   @type t :: %__MODULE__{
           file: Path.t(),
           walls: [wall()],
@@ -38,7 +38,7 @@ defmodule Sim.Stage do
           landmark: Pose.point() | nil,
           balls: [{float(), float(), float()}],
           boxes: [{Pose.t(), float(), float()}],
-          marks: [{non_neg_integer(), Pose.t()}],
+          marks: [{pos_integer(), Pose.t(), Entities.at()}],
           notes: [String.t()]
         }
 
@@ -149,7 +149,7 @@ defmodule Sim.Stage do
         tell(state, what, at, ": " <> why)
       end)
     )
-    |> put(:robots, robot)
+    |> put(:robots, if(state.finder?, do: robot, else: %{robot | mark: nil}))
   end
 
   # Drawn where there are blocks in a model, and read with it.
@@ -291,13 +291,18 @@ defmodule Sim.Stage do
   defp mark(%{finder?: false} = state, _entity, _pose, _length), do: state
 
   defp mark(state, entity, pose, length) do
-    id = entity |> Values.number("fiducial_return", 0.0) |> trunc()
+    case Values.mark(entity) do
+      nil ->
+        state
 
-    if id > 0 do
-      {x, y} = Pose.place(pose, {length / 2 + @before, 0.0})
-      put(state, :marks, {id, Pose.new(x, y, pose.heading)})
-    else
-      state
+      id ->
+        {x, y} = Pose.place(pose, {length / 2 + @before, 0.0})
+
+        put(
+          state,
+          :marks,
+          {id, Pose.new(x, y, pose.heading), Values.at(entity, "fiducial_return")}
+        )
     end
   end
 end

@@ -60,6 +60,7 @@ defmodule Player.Connection do
       pictures: nil,
       bucket: nil,
       drove_ms: nil,
+      stood_ms: nil,
       refused_ms: nil
     }
 
@@ -160,13 +161,14 @@ defmodule Player.Connection do
     %{s | session: Session.scene(s.session, message, module.scene(live), now_s())}
   end
 
-  defp effect({:drive, ahead, left}, s) do
-    given_us = System.monotonic_time(:microsecond)
+  # To stand still is no client's privilege.
+  defp effect({:drive, ahead, left}, s) when ahead == 0 and left == 0,
+    do: s |> tap(&drive(&1, {0.0, 0.0})) |> begun(:stood_ms, "#{s.robot} stands", {:ok, "begins"})
 
+  defp effect({:drive, ahead, left}, s) do
     case s.claim.(s.who) do
       :ok ->
-        order = Orders.of_speed(s.robot, {ahead, left}, @drive_ms, s.source, given_us)
-        Orders.give(s.orders, order)
+        drive(s, {ahead, left})
         begun(s, :drove_ms, "drives #{s.robot}", {:ok, "begins"})
 
       {:error, by} ->
@@ -198,6 +200,11 @@ defmodule Player.Connection do
       {:ok, bucket} -> tap(%{s | bucket: bucket}, &told(&1, "#{s.robot} says", {:ok, text}))
       :error -> s
     end
+  end
+
+  defp drive(s, speeds) do
+    given_us = System.monotonic_time(:microsecond)
+    Orders.give(s.orders, Orders.of_speed(s.robot, speeds, @drive_ms, s.source, given_us))
   end
 
   defp bucket(s), do: Bucket.take(s.bucket, @at_once, @per_minute, Hal.Clock.now_ms())

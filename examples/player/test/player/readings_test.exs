@@ -174,7 +174,7 @@ defmodule Player.ReadingsTest do
     {:ok, session, [order: "mag1 goto:1.0:2.0:0.5"]} = hear.(session, {4, 0}, 2, place)
     {:ok, session, []} = hear.(session, {4, 0}, 2, place)
 
-    {:ok, session, [drive: 0.2, drive: 0.0]} =
+    {:ok, session, [drive: 0.2, drive: +0.0]} =
       Session.hear(
         session,
         Client.message({4, 0}, 2, 1, <<0.2::float, 0::64, 0::64, 1::32>>),

@@ -205,6 +205,17 @@ defmodule Player.ServerTest do
     assert at.vx > 0.0
     {_at, other} = await(other, @position2d, &position/1)
 
+    # But it may stop it.
+    {client, other} =
+      Enum.reduce_while(1..100, {client, other}, fn _nth, {client, other} ->
+        client = moving.(client)
+        {at, other} = other |> velocity(0.0, 0.0) |> await(@position2d, &position/1)
+        if at.vx < 0.02, do: {:halt, {client, other}}, else: {:cont, {client, other}}
+      end)
+
+    {at, other} = await(other, @position2d, &position/1)
+    assert at.vx < 0.1
+
     # Silence is a stop.
     {stood, _client} = await(client, @position2d, &if(position(&1).vx < 0.01, do: position(&1)))
     assert :math.sqrt((stood.x - start.x) ** 2 + (stood.y - start.y) ** 2) > 0.05

@@ -39,8 +39,12 @@ defmodule Console.Page.Service do
     for {name, port} <- asked do
       {_port, module} = Keyword.fetch!(all(), name)
 
-      case Page.start_link(Keyword.merge(options, service: module, port: port)) do
-        {:ok, _page, url} -> "#{String.capitalize("#{name}")}:  #{url}"
+      with true <- Code.ensure_loaded?(module),
+           {:ok, _page, url} <-
+             Page.start_link(Keyword.merge(options, service: module, port: port)) do
+        "#{String.capitalize("#{name}")}:  #{url}"
+      else
+        false -> "no #{name}: #{inspect(module)} is not in this build"
         {:error, line} -> "no #{name}: #{line}"
       end
     end

@@ -9,10 +9,12 @@ defmodule Lab.Trial.WorldFile do
   alias Hal.RobotName
   alias Robot.File.Body
   alias Sim.Stage
+  alias Vision.Marks
 
   @degrees 180 / :math.pi()
   # The side of a mark in metres: a camera of 320 pixels across 60 degrees reads it at 4 m.
   @mark 0.3
+  @most_id 65_535
 
   @enforce_keys [:options, :notes]
   defstruct @enforce_keys
@@ -30,7 +32,7 @@ defmodule Lab.Trial.WorldFile do
     with {:ok, world} <- Stage.open(file),
          names = names(world.robots),
          {:ok, bodies} <- bodies(Enum.zip(names, world.robots), []) do
-      {marks, notes} = marks(world)
+      {marks, notes} = marks(world, names)
 
       options = [
         robots: names,
@@ -107,26 +109,40 @@ defmodule Lab.Trial.WorldFile do
     end
   end
 
-  # What robots can tell apart: each id hangs once.
-  defp marks(%{marks: []}), do: {nil, []}
+  # On models, and on the backs of robots of which no two have the same id.
+  defp marks(world, names) do
+    borne =
+      for {%{mark: id, at: at}, name} when id != nil <- Enum.zip(world.robots, names),
+          do: {id, name, at}
 
-  defp marks(world) do
-    with {:ok, %{family: family}} <- Vision.Marks.new(size: @mark),
-         :ok <- Vision.Marks.available(family) do
-      {known, odd} =
-        Enum.split_with(world.marks, fn {id, _} ->
-          id <= 65_535 and Vision.Marks.picture(family, id) != nil
-        end)
+    often = borne |> Enum.map(&elem(&1, 0)) |> Enum.frequencies()
+    {own, shared} = Enum.split_with(borne, fn {id, _name, _at} -> often[id] == 1 end)
 
-      at = for {id, pose} <- known, do: {id, pose(pose)}
+    notes = told(shared, " of robots", "several have it")
 
-      notes =
-        for {id, _pose} <- Enum.take(odd, 1),
-            do: "#{world.file}: fiducial_return #{id} is left out: #{family} has no such mark"
+    if world.marks == [] and own == [], do: {nil, notes}, else: hung(world, own, notes)
+  end
 
-      {if(at != [], do: [size: @mark, at: at, known: []]), notes}
+  defp hung(world, own, notes) do
+    with {:ok, %{family: family}} <- Marks.new(size: @mark), :ok <- Marks.available(family) do
+      known? = fn {id, _where, _at} -> id <= @most_id and Marks.picture(family, id) != nil end
+
+      {own, odd_own} = Enum.split_with(own, known?)
+      {hung, odd} = Enum.split_with(world.marks, known?)
+      at = for {id, pose, _at} <- hung, do: {id, pose(pose)}
+      own = for {id, name, _at} <- own, do: {id, name}
+
+      odd = told(odd ++ odd_own, "", "#{family} has no such mark")
+      marks = [size: @mark, at: at, known: [], robots: own]
+      {if(at != [] or own != [], do: marks), notes ++ odd}
     else
-      {:error, line} -> {nil, ["#{world.file}: fiducial_return is left out: #{line}"]}
+      {:error, line} -> {nil, notes ++ told(world.marks ++ own, "", line)}
     end
+  end
+
+  # Of several the first.
+  defp told(marks, whose, why) do
+    for {id, _where, {file, line, _column}} <- Enum.take(marks, 1),
+        do: "#{file}:#{line}: fiducial_return #{id}#{whose} is left out: #{why}"
   end
 end

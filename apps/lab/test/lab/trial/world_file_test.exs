@@ -65,6 +65,37 @@ defmodule Lab.Trial.WorldFileTest do
              Setup.new(world: "no.world")
   end
 
+  @tag skip: with({:error, line} <- Vision.Marks.available(), do: line, else: (_ok -> nil))
+  test "marks hang at models and on the backs of robots that have one of their own", %{
+    tmp_dir: folder
+  } do
+    text = """
+    define finder position ( fiducial () fiducial_return 1 )
+    finder ( name "a" ) finder ( name "b" pose [2 0 0 0] )
+    finder ( name "c" pose [4 0 0 0] fiducial_return 9 )
+    model ( size [0.2 1 1] pose [0 3 0 -90] fiducial_return 7 )
+    model ( size [0.2 1 1] pose [9 3 0 -90] fiducial_return 60000 )
+    """
+
+    file = write(folder, text)
+    assert {:ok, world} = WorldFile.open(file)
+
+    assert [size: 0.3, at: [{7, {x, y, turn}}], known: [], robots: [{9, :c}]] =
+             world.options[:marks]
+
+    assert_in_delta x, 0.0, 1.0e-9
+    assert_in_delta y, 2.87, 1.0e-9
+    assert_in_delta turn, -90.0, 1.0e-9
+
+    assert [
+             "2: fiducial_return 1 of robots is left out: several have it",
+             "5: fiducial_return 60000 is left out: tag36h11 has no such mark"
+           ] = for(note <- world.notes, do: String.replace_prefix(note, file <> ":", ""))
+
+    assert {:ok, setup} = Setup.new(world: file)
+    assert length(setup.world.marks) == 2
+  end
+
   test "without a landmark there is none, and two robots or a wall in one place are refused", %{
     tmp_dir: folder
   } do

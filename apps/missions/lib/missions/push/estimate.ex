@@ -107,12 +107,15 @@ defmodule Missions.Push.Estimate do
     end
   end
 
-  @doc "What another robot is sure of, for one that knows nothing of the box."
-  @spec adopt(Pose.t(), Box.size(), integer()) :: t()
-  def adopt(pose, size, at_ms) do
+  @doc """
+  What another robot is sure of, for one that knows nothing of the box: it may have been pushed until now, and how uncertain that robot is of its
+  own place is `sd`.
+  """
+  @spec adopt(Pose.t(), sd :: float(), Box.size(), integer()) :: t()
+  def adopt(pose, sd, size, at_ms) do
     var = [[@adopted_var, 0.0, 0.0], [0.0, @adopted_var, 0.0], [0.0, 0.0, @adopted_var]]
     guess = %{pose: pose, var: var, likely: 0.0}
-    %__MODULE__{size: size, all: [guess], seen_ms: at_ms, seen: @found}
+    %__MODULE__{size: size, all: [guess], seen_ms: at_ms, pushed_ms: at_ms, seen: @found, sd: sd}
   end
 
   # At the middle between the edges, behind the nearest corner.

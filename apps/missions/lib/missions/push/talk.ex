@@ -25,9 +25,10 @@ defmodule Missions.Push.Talk do
   def table do
     mm = {:integer, -@most_mm, @most_mm, "mm"}
     angle = {:integer, -@most_mrad, @most_mrad, "mrad"}
+    sd = {:integer, 0, 10_000, "mm"}
     cost = {:or, nil, {:integer, 0, @most_mm, "mm"}}
 
-    {1,
+    {2,
      box: [
        plan: [{:integer, 0, 0xFFFFFFF}, required: true],
        side: [{:or, nil, {:integer, -1, 1}}, required: true],
@@ -37,7 +38,7 @@ defmodule Missions.Push.Talk do
        right_mm: [cost, required: true],
        lone_mm: [cost, required: true],
        box: [
-         {:or, nil, {:tuple, [mm, mm, angle], "{x, y, heading} in mm and mrad"}},
+         {:or, nil, {:tuple, [mm, mm, angle, sd], "{x, y, heading, sd} in mm and mrad"}},
          required: true
        ],
        at: [{:or, nil, {:tuple, [mm, mm], "{x, y} in mm"}}, required: true],
@@ -47,7 +48,7 @@ defmodule Missions.Push.Talk do
          required: true
        ],
        near_mm: [{:or, nil, {:integer, 0, 100_000, "mm"}}, required: true],
-       sd_mm: [{:integer, 0, 10_000, "mm"}, required: true],
+       sd_mm: [sd, required: true],
        sd_mrad: [{:integer, 0, 10_000, "mrad"}, required: true]
      ]}
   end
@@ -71,7 +72,7 @@ defmodule Missions.Push.Talk do
     with true <- Estimate.sure?(box) and now_ms - box.seen_ms < @tell_box_ms,
          {%{x: x, y: y, heading: heading}, _sd, _sd_heading} = Estimate.best(box),
          true <- abs(x) < 1.0e4 and abs(y) < 1.0e4 do
-      {round(1000 * x), round(1000 * y), mrad(heading)}
+      {round(1000 * x), round(1000 * y), mrad(heading), min(round(1000 * box.sd), 10_000)}
     else
       false -> nil
     end
@@ -125,8 +126,10 @@ defmodule Missions.Push.Talk do
     }
   end
 
-  @doc "Where it is sure that the box lies; `nil` if it is not."
-  @spec box(map()) :: Pose.t() | nil
+  @doc "Where it is sure that the box lies, and how uncertain it is of its own place (m); `nil` if it is not sure."
+  @spec box(map()) :: {Pose.t(), sd :: float()} | nil
   def box(%{box: nil}), do: nil
-  def box(%{box: {x, y, heading}}), do: Pose.new(x / 1000, y / 1000, heading / 1000)
+
+  def box(%{box: {x, y, heading, sd}}),
+    do: {Pose.new(x / 1000, y / 1000, heading / 1000), sd / 1000}
 end

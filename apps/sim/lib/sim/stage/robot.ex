@@ -21,9 +21,20 @@ defmodule Sim.Stage.Robot do
   @linear {0.5, 0.5}
   @turn {1.0, 1.0}
 
-  @typedoc "`kind` is the name of its definition, `name` its own or `nil`; `at` is where it stands in the file."
+  # What cameras, rangers and bodies make of a robot here, and what is said of another value in a file.
+  @returns [
+    {"obstacle_return", 1.0, "robots are solid"},
+    {"ranger_return", 0.5, "rangers see robots"},
+    {"blob_return", 1.0, "cameras see robots"}
+  ]
+
+  @typedoc """
+  `kind` is the name of its definition, `name` its own or `nil`; `at` is where it stands in the file; `mark` is the id that finders
+  of marks read on it, or `nil`.
+  """
   @type t :: %{
           name: String.t() | nil,
+          mark: pos_integer() | nil,
           kind: String.t(),
           at: Entities.at(),
           pose: Pose.t(),
@@ -44,12 +55,15 @@ defmodule Sim.Stage.Robot do
     robot = %{
       name: Values.text(entity, "name"),
       kind: hd(entity.names),
+      mark: Values.mark(entity),
       at: entity.at,
       pose: pose,
       body: values
     }
 
-    {robot, clamped ++ alike(sonars) ++ further(lidars, "lidar") ++ single(entity, cameras)}
+    {robot,
+     clamped ++
+       returns(entity) ++ alike(sonars) ++ further(lidars, "lidar") ++ single(entity, cameras)}
   end
 
   @doc "The ids of robots that finders of marks see: whether it has one."
@@ -269,6 +283,13 @@ defmodule Sim.Stage.Robot do
     do: :erlang.float_to_binary(value, [:compact, decimals: 3])
 
   defp shown(value), do: to_string(value)
+
+  defp returns(entity) do
+    for {name, least, why} <- @returns,
+        value = Values.number(entity, name, 1.0),
+        value < least,
+        do: {Values.at(entity, name), "#{name} of #{shown(value)} on a robot", why}
+  end
 
   # All sonars of a body here are of one kind.
   defp alike([first | others]) do

@@ -13,6 +13,7 @@ defmodule Sim.Stage.Values do
   @forms %{
     "acceleration_bounds" => {:numbers, 4..8},
     "bitmap" => :text,
+    "blob_return" => {:numbers, 1..1},
     "boundary" => {:numbers, 1..1},
     "color" => :text,
     "color_rgba" => {:numbers, 3..4},
@@ -167,6 +168,13 @@ defmodule Sim.Stage.Values do
       {nil, nil} -> nil
       {nil, name} -> Colours.named(name)
     end
+  end
+
+  @doc "The id that finders of marks read, or `nil`: without one, and for what is none, such as 0."
+  @spec mark(Entities.entity()) :: pos_integer() | nil
+  def mark(entity) do
+    id = entity |> number("fiducial_return", 0.0) |> trunc()
+    if id > 0, do: id
   end
 
   @doc "Radians of degrees."

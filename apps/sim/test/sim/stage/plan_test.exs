@@ -42,6 +42,18 @@ defmodule Sim.Stage.PlanTest do
     assert Floorplan.wall?(map, {-3.0, 0.0})
   end
 
+  test "the first row of a picture is the highest, its first column that on the left", %{
+    tmp_dir: folder
+  } do
+    File.write!(Path.join(folder, "l.pgm"), "P2 2 2 255 0 255 0 0")
+
+    {:ok, map} =
+      plan(folder, "model ( bitmap \"l.pgm\" size [4 4 1] ) position ( pose [1 1 0 0] )")
+
+    walls = for x <- [-1.0, 1.0], y <- [-1.0, 1.0], Floorplan.wall?(map, {x, y}), do: {x, y}
+    assert walls == [{-1.0, -1.0}, {-1.0, 1.0}, {1.0, -1.0}]
+  end
+
   test "a boundary closes the door; a turned picture is turned", %{tmp_dir: folder} do
     {:ok, closed} = plan(folder, "model ( bitmap \"a.pgm\" size [6 3 1] boundary 1 ) position ()")
 

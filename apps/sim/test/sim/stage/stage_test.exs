@@ -93,7 +93,8 @@ defmodule Sim.StageTest do
 
     assert world.landmark == {2.0, 0.0}
     assert world.balls == [{-1.0, 1.0, 0.1}]
-    assert [{%Pose{x: 0.0, y: 3.0}, 0.8, 0.4}] = world.boxes
+    assert [{%Pose{x: x, y: 3.0}, 0.8, 0.4}] = world.boxes
+    assert x == 0.0
     assert [{:polygon, whole}, {:polygon, part}] = world.walls
     near = fn points, {x, y} -> Enum.any?(points, &(Pose.distance(&1, {x, y}) < 1.0e-9)) end
     assert near.(whole, {4.5, 1.0}) and near.(whole, {5.5, -1.0})
@@ -123,10 +124,22 @@ defmodule Sim.StageTest do
            ]
   end
 
+  test "what a robot would be without a body, or unseen, is told" do
+    notes = read!(@robot <> "rover ( obstacle_return 0 ranger_return 0.5 blob_return 0 )").notes
+
+    assert notes == [
+             "w/a.world:2: blob_return of 0.0 on a robot is left out: cameras see robots",
+             "w/a.world:2: obstacle_return of 0.0 on a robot is left out: robots are solid"
+           ]
+  end
+
   test "marks hang before their models where a robot has a finder" do
     text = "model ( size [0.2 1 1] pose [1 0 0 180] fiducial_return 7 )\n" <> @robot
     assert read!(text <> "rover ()").marks == []
-    assert [{7, %Pose{x: x, y: y}}] = read!(text <> "rover ( fiducial () )").marks
+
+    assert [{7, %Pose{x: x, y: y}, {"w/a.world", 1, _column}}] =
+             read!(text <> "rover ( fiducial () )").marks
+
     assert_in_delta x, 0.87, 1.0e-9
     assert_in_delta y, 0.0, 1.0e-9
   end
