@@ -10,6 +10,7 @@ defmodule Vision.MixProject do
           blobs: ["blobs.c", "runs.c", "masks.c", "blobs_nif.c"],
           similar: [
             "similar.c",
+            "similar_fit.c",
             "similar_read.c",
             "blobs.c",
             "runs.c",

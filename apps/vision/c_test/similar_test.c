@@ -1,4 +1,4 @@
-// sources: ../c_src/similar.c ../c_src/similar_read.c
+// sources: ../c_src/similar.c ../c_src/similar_fit.c ../c_src/similar_read.c
 /* Self-similar marks of all sizes, whole and cut, turned, under noise, and pictures of chance through the search under
    sanitizers. The pixels are in blocks of exactly their size, so that a read beyond them is seen. */
 #include <stdio.h>
