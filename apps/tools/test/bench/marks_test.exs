@@ -20,8 +20,9 @@ defmodule Bench.MarksTest do
       assert Runner.empty(family, empty, @maps, 5) == 0
       counts = family |> Runner.tagged(tagged, @maps, 5) |> Enum.frequencies_by(& &1.what)
       assert counts[:wrong] == nil
-      # Walls hide some.
-      assert counts.right > tagged / 2
+
+      # Walls hide some. Self-similar marks are twice as wide, and two of five hang too far away for 24 pixels.
+      assert counts.right > tagged / if(family == :similar, do: 3, else: 2)
     end
   end
 

@@ -65,6 +65,14 @@ defmodule Vision.Mark do
   @spec name(t()) :: String.t()
   def name(%__MODULE__{family: family, id: id}), do: "#{family} #{id}"
 
+  @doc """
+  How far a mark's code reaches to the right of its centre, in sides of its square: that of a self-similar mark stands beside the
+  square.
+  """
+  @spec code_end(family()) :: float()
+  def code_end(:similar), do: 1.5
+  def code_end(_apriltag), do: 0.5
+
   @doc "The least and the greatest x, and the same of y."
   @spec bounds([point(), ...]) :: {{float(), float()}, {float(), float()}}
   def bounds(corners) do

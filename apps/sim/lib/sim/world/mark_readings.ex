@@ -4,8 +4,8 @@ defmodule Sim.World.MarkReadings do
   # compare it with painting. Pure.
   #
   # A mark is read if it faces the camera, is whole in the picture and wide enough, and nothing stands before its middle or its
-  # sides, or the end of its barcode. Its corners are off by what a detector's are, so that range, bearing and yaw have the errors, and the doubts, of
-  # those in pictures (`Vision.Marks.Pose`).
+  # sides, or the end of its barcode. Its corners are off by what a detector's are, so that range, bearing and yaw have the
+  # errors, and the doubts, of those in pictures (`Vision.Marks.Pose`).
   alias Sim.{Compute, Noise}
   alias Sim.Compute.{CameraFrustum, Columns, Rays}
   alias Vision.Marks
@@ -13,8 +13,6 @@ defmodule Sim.World.MarkReadings do
   # What 20 pixels of a `tag36h11` are for a `tagStandard41h12`, whose square is 5 cells wide instead of 8.
   # A self-similar mark has cells of a tenth of its square.
   @wide_px [tag36h11: 20.0, tagStandard41h12: 14.0, similar: 24.0]
-  # The end of a self-similar mark's barcode, in squares from its middle.
-  @code_end 1.5
   @corner_px 0.2
   # A wall nearer than the mark by this (metres) hides it; depths below the nearest are behind the camera.
   @before 1.0e-6
@@ -66,9 +64,11 @@ defmodule Sim.World.MarkReadings do
     end
   end
 
+  # The end of a barcode that stands beside the square.
   defp code(%{family: :similar, pose: pose, size: size}) do
     {c, s} = Sim.Trig.cos_sin(pose.heading)
-    [{pose.x - @code_end * size * s, pose.y + @code_end * size * c}]
+    right = Vision.Mark.code_end(:similar) * size
+    [{pose.x - right * s, pose.y + right * c}]
   end
 
   defp code(_apriltag), do: []

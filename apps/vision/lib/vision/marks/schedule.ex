@@ -9,8 +9,8 @@ defmodule Vision.Marks.Schedule do
   @boxes_ms 100
   # A camera is not exact to the millisecond.
   @slack_ms 10
-  # A box is twice as wide as its mark, and at least so many pixels to each side of its centre: a robot that turns at 0.5 rad/s
-  # moves it by 28 pixels in 100 ms at 640 pixels across 60 degrees.
+  # A box is twice as wide as its mark's square, and at least so many pixels to each side of its centre: a robot that turns at
+  # 0.5 rad/s moves it by 28 pixels in 100 ms at 640 pixels across 60 degrees. What stands beside the square comes to that.
   @least_px 40
 
   defstruct whole_ms: nil, looked_ms: nil, marks: []
@@ -66,11 +66,12 @@ defmodule Vision.Marks.Schedule do
   defp due?(last_ms, at_ms, period_ms),
     do: at_ms < last_ms or at_ms - last_ms >= period_ms - @slack_ms
 
-  defp around(%Mark{x: x, y: y, corners: corners}, {width, height}) do
+  defp around(%Mark{x: x, y: y, corners: corners, family: family}, {width, height}) do
     {{left, right}, {top, bottom}} = Mark.bounds(corners)
     half = Enum.max([right - left, bottom - top, @least_px])
+    beside = (Mark.code_end(family) - 0.5) * (right - left)
 
-    {max(floor(x - half), 0), max(floor(y - half), 0), min(ceil(x + half), width),
+    {max(floor(x - half), 0), max(floor(y - half), 0), min(ceil(x + half + beside), width),
      min(ceil(y + half), height)}
   end
 

@@ -43,6 +43,9 @@ defmodule Vision.Marks.ScheduleTest do
     assert at.([mark(300.0, 200.0, 30)]) == {:boxes, [{240, 140, 360, 260}]}
     assert at.([mark(10.0, 470.0, 5)]) == {:boxes, [{0, 430, 50, 480}]}
     assert at.([]) == {:boxes, []}
+    # The barcode stands to the right of the square.
+    similar = %{mark(300.0, 200.0, 30) | family: :similar}
+    assert at.([similar]) == {:boxes, [{240, 140, 420, 260}]}
   end
 
   test "boxes that overlap become one, and as much as a whole picture is one" do

@@ -77,7 +77,7 @@ defmodule Vision.Marks.SimilarTest do
         do: assert_in_delta(t, :math.pow(2 / 3, k / 2), 1.0e-12)
 
     picture = Pattern.picture(3)
-    [_above | _] = rows = Picture.rows(picture)
+    rows = Picture.rows(picture)
     assert length(rows) == picture.rows
 
     colour = fn t ->
@@ -149,6 +149,16 @@ defmodule Vision.Marks.SimilarTest do
     frame = frame([{9, 106.0, 12.0, 36.0, 0.0}, {9, 8.0, 66.0, 40.0, 0.0}])
     assert {:ok, [%{id: 9, x: left}, %{id: 9, x: right}]} = find(frame)
     assert left < right
+  end
+
+  test "it is found again where it was, with its barcode" do
+    {:ok, marks} = Marks.new(family: :similar, size: 0.16)
+    {:ok, detector} = Marks.detector(marks)
+    first = frame([{6, 20.0, 40.0, 44.0, 0.0}])
+    {:ok, [%{id: 6}], schedule} = Marks.look(marks, detector, %Marks.Schedule{}, first)
+    next = %{frame([{6, 26.0, 38.0, 44.0, 0.0}]) | at_ms: first.at_ms + 100}
+    assert {:boxes, [_box]} = Marks.Schedule.plan(schedule, next.at_ms, {@width, @height})
+    assert {:ok, [%{id: 6, at_ms: 107}], _schedule} = Marks.look(marks, detector, schedule, next)
   end
 
   test "C and Elixir find the same, to the bit" do
