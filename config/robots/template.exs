@@ -81,9 +81,10 @@
   # distance is the share of the picture that a thing fills which is 1 m away.
   colours: "landmark.txt",
 
-  # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none; :similar needs no library. The size is the
-  # side of the square between the corners, in metres. known: [{7, {2.0, 1.5, deg(90)}}] says where some hang and face that the
-  # map does not name, robots: [{11, :mag2}] which robots bear them on their backs.
+  # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none; those of the
+  # family :similar need no library. The size is the side of the square between the corners, in metres.
+  # known: [{7, {2.0, 1.5, deg(90)}}] says where some hang and face that the map does not name, robots: [{11, :mag2}] which
+  # robots bear them on their backs.
   marks: nil,
 
   # Keeps pictures of the camera as JPEG, so many a second, the newest of them, in a folder that is there:

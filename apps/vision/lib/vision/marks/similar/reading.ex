@@ -11,6 +11,7 @@ defmodule Vision.Marks.Similar.Reading do
                  Enum.with_index(Enum.chunk_every(Pattern.edges(), 2, 1, :discard)),
                k in 2..6,
                do: {left, right, 1 - rem(k, 2)}
+
   @doc "The mark whose origins these are; `nil` if there is none that can be read."
   @spec read(Fit.luma(), Fit.chain()) :: Vision.Marks.Native.found() | nil
   def read(luma, chain) do
