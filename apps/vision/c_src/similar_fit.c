@@ -91,11 +91,10 @@ static void add(const struct similar_pattern *pattern, double t, double left, do
     double here = similar_column(pattern, t, (double)y), most = 3.0 * (double)pattern->chain->scale, at;
     double before = here - similar_column(pattern, t - left, (double)y);
     double behind = similar_column(pattern, t + right, (double)y) - here;
-    double half = (before < behind ? before : behind) / 2.0;
+    double next = before < behind ? before : behind, half = next / 2.0 < most ? next / 2.0 : most;
 
-    if (half < 0.9)
+    if (next < SIMILAR_NEAREST)
         return;
-    half = half < most ? half : most;
     int64_t from = (int64_t)floor(here - half + 0.5), to = (int64_t)floor(here + half + 0.5);
 
     sums->looked++;

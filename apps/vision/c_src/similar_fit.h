@@ -6,6 +6,9 @@
 
 enum { SIMILAR_TERMS = 5, SIMILAR_CELLS = 8 };
 
+/* Edges that are nearer to each other, in pixels, are not looked for. */
+#define SIMILAR_NEAREST 1.8
+
 /* x (to the right) and y (down) of the picture are u and v here: pattern widths from a point of the line of origins.
    The place in the pattern is t = (a u + b v + c) / (d u + e v + 1), as a plane seen in perspective has it. */
 struct similar_pattern {

@@ -154,6 +154,9 @@ static int code(const struct similar_pattern *pattern)
         if (wide >= 2.0 && majority(pattern, (left + right) / 2.0) != 1 - k % 2)
             return -1;
     }
+    /* Where the last cells are narrower, the fit has not followed the barcode to its end. */
+    if (similar_column(pattern, 2.0, pattern->y) - similar_column(pattern, 1.9, pattern->y) < SIMILAR_NEAREST)
+        return -1;
     /* The white at the sides may be less than a pixel wide. */
     if (majority(pattern, -0.05) == 1 || majority(pattern, 1.05) != 0 || majority(pattern, 1.15) != 1 ||
         majority(pattern, 2.05) == 1)
@@ -176,7 +179,7 @@ static int code(const struct similar_pattern *pattern)
     return -1;
 }
 
-/* Cells of the barcode are two pixels wide. The square is at least about as high as it seems to be wide: else a part of it
+/* The square is wide enough for its barcode, and at least about as high as it seems to be wide: else a part of it
    is hidden. It is higher where the stripes say that it is nearer: heights go with 1 + d u. */
 static int whole(const struct similar_pattern *pattern, const double corners[4][2])
 {

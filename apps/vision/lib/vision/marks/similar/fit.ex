@@ -11,6 +11,7 @@ defmodule Vision.Marks.Similar.Fit do
              do: {t, t - left, right - t, if(rem(k, 2) == 1, do: -1.0, else: 1.0)}
   # So many cells of the barcode are followed in each round.
   @reaches [0, 0, 3, 6, 9]
+  @nearest 1.8
 
   @type luma :: %{width: pos_integer(), height: pos_integer(), bytes: binary()}
   @typedoc "As `struct similar_chain`."
@@ -37,6 +38,10 @@ defmodule Vision.Marks.Similar.Fit do
           threshold: float(),
           contrast: float()
         }
+
+  @doc "Edges that are nearer to each other, in pixels, are not looked for."
+  @spec nearest() :: float()
+  def nearest, do: @nearest
 
   @doc "The pattern whose origins these are; `nil` if there is none."
   @spec fit(luma(), chain()) :: t() | nil
@@ -147,12 +152,12 @@ defmodule Vision.Marks.Similar.Fit do
     here = column(reader, t, y)
     before = here - column(reader, t - left, y)
     behind = column(reader, t + right, y) - here
-    half = min(before, behind) / 2.0
+    next = min(before, behind)
 
-    if half < 0.9 do
+    if next < @nearest do
       {sums, looked, met}
     else
-      half = min(half, 3.0 * reader.chain.scale)
+      half = min(next / 2.0, 3.0 * reader.chain.scale)
       {from, to} = {floor(here - half + 0.5), floor(here + half + 0.5)}
       at = if to - from >= 2, do: edge(reader, from, to, y, sign)
 

@@ -119,7 +119,7 @@ defmodule Vision.Marks.Similar.Reading do
     if length(corners) == 4, do: corners
   end
 
-  # Cells of the barcode are two pixels wide. The square is at least about as high as it seems to be wide: else a part of it is
+  # The square is wide enough for its barcode, and at least about as high as it seems to be wide: else a part of it is
   # hidden. It is higher where the stripes say that it is nearer: heights go with 1 + d u.
   defp whole?(%{m: {_, _, _, d, _}} = reader, [{x0, y0}, {x1, y1}, {x2, y2}, {x3, y3}]) do
     width = reader.chain.width
@@ -170,12 +170,17 @@ defmodule Vision.Marks.Similar.Reading do
   end
 
   defp id(reader) do
-    if Enum.all?(@stripes, &stripe?(reader, &1)) and majority(reader, -0.05) != 1 and
+    if Enum.all?(@stripes, &stripe?(reader, &1)) and followed?(reader) and
+         majority(reader, -0.05) != 1 and
          majority(reader, 1.05) == 0 and majority(reader, 1.15) == 1 and
          majority(reader, 2.05) != 1 do
       Pattern.id(for k <- 0..7, do: majority(reader, 1.25 + 0.1 * k))
     end
   end
+
+  # Where the last cells are narrower, the fit has not followed the barcode to its end.
+  defp followed?(reader),
+    do: Fit.column(reader, 2.0, reader.y) - Fit.column(reader, 1.9, reader.y) >= Fit.nearest()
 
   # Stripes that are less than two pixels wide are not looked at.
   defp stripe?(reader, {left, right, black}) do
