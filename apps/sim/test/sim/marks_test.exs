@@ -37,6 +37,15 @@ defmodule Sim.MarksTest do
     end
   end
 
+  test "a self-similar mark is not read where the last cells of its barcode are too narrow" do
+    # 1.3 to 1.5 pixels at 60 degrees, with the barcode behind; 2.1 at 35.
+    for id <- 0..15, {yaw, read?} <- [{1.33, false}, {1.35, false}, {1.37, false}, {0.9, true}] do
+      mark = Keyword.merge(hung(id, {1.45, 0.46}, yaw), family: :similar, size: 0.2)
+      read = for found <- seen(world([mark]), :similar, 0.2), do: found.id
+      assert {id, yaw, read} == {id, yaw, if(read?, do: [id], else: [])}
+    end
+  end
+
   test "where the camera looks counts" do
     world = [hung(3, {0.3, 2.0}, 1.4)] |> world() |> World.look(:mag1, 1.3, 0.1)
     assert seen(world) == []
