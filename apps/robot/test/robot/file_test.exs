@@ -121,7 +121,7 @@ defmodule Robot.FileTest do
 
     assert lines("#{camera}, marks: [family: :tag36h10, sice: 1]", colours: colours()) == [
              "mag1.exs:2: marks.sice: is not known: allowed are family, size, known, robots; did you mean size?",
-             "mag1.exs:2: marks.family: expected :tag36h11 or :tagStandard41h12, got :tag36h10; did you mean :tag36h11?",
+             "mag1.exs:2: marks.family: expected :tag36h11, :tagStandard41h12 or :similar, got :tag36h10; did you mean :tag36h11?",
              "mag1.exs:2: marks.size: is missing: expected a number from 0.01 to 10.0 m"
            ]
 
