@@ -26,6 +26,9 @@ config :swarm,
 # What records a robot whose file says `record:`, and keeps its last minute, if it says `incidents:`.
 config :swarm, recorder: Record.Recorder, incidents: Record.Incidents
 
+# What runs beside each robot: the programs of this build, which people start and end on it.
+config :swarm, companions: [{Agents.Programs, battery: Agents.Battery}]
+
 # What bin/demo and bin/console serve to other programs if they are asked to: option, port and module.
 config :console,
   services: [

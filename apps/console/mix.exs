@@ -3,7 +3,11 @@ Code.require_file("../../support.exs", __DIR__)
 defmodule Console.MixProject do
   use Mix.Project
 
-  def project, do: Convoy.Support.project(:console, deps: [{:lab, in_umbrella: true}])
+  def project,
+    do:
+      Convoy.Support.project(:console,
+        deps: [{:lab, in_umbrella: true}, {:agents, in_umbrella: true}]
+      )
 
   def application,
     do: [extra_applications: [:logger, :crypto] ++ for_tests(Mix.env()) ++ [mochiweb: :optional]]

@@ -6,7 +6,7 @@ defmodule Sim.MixProject do
   def project do
     Convoy.Support.project(:sim,
       native: [
-        nifs: [kernel: ["rays.c", "paint.c", "regions.c", "kernel_nif.c"]]
+        nifs: [kernel: ["rays.c", "walls.c", "paint.c", "regions.c", "kernel_nif.c"]]
       ],
       deps: [{:nav, in_umbrella: true}, {:vision, in_umbrella: true}]
     )

@@ -140,6 +140,7 @@ defmodule Docs.Checks do
     "-kernel prevent_overlapping_partitions",
     "config :swarm, mesh: [multicast",
     "config :swarm, mesh: [topologies",
+    "config :swarm, companions: [{Agents.Programs",
     "-pa _build/dev/lib/hal/ebin _build/dev/lib/mesh/ebin",
     # Programs in Python; apps/bridge tries them where roslibpy is.
     "pip install roslibpy",

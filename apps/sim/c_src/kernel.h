@@ -107,6 +107,17 @@ void sim_field(const uint8_t *walls, int64_t width, int64_t height, uint8_t *fie
 double sim_wall(const sim_map *map, double x, double y, double rx, double ry, double most,
                 int *axis);
 
+/* At most SIM_CHUNK rays, each from a place in a direction. */
+enum { SIM_CHUNK = 64 };
+
+typedef struct {
+    size_t count;
+    double x[SIM_CHUNK], y[SIM_CHUNK], rx[SIM_CHUNK], ry[SIM_CHUNK];
+} sim_rays;
+
+/* sim_wall for each of them. */
+void sim_walls(const sim_map *map, const sim_rays *rays, double most, double *goes, uint8_t *axes);
+
 /* The ranges of a robot's sonars. `near` is scratch for twice `count` discs. */
 void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const sim_ring *ring,
                const sim_noise *noise, sim_disc *near, double *ranges);

@@ -391,16 +391,27 @@ void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles
     const int64_t width = sight->width, height = sight->height;
     const uint8_t *paints[256] = {0};
     size_t made = 0;
+    sim_rays rays;
+    double walls[SIM_CHUNK];
+    uint8_t axes[SIM_CHUNK];
 
     for (size_t k = 0; k < count; k++) {
         scratch->spans[k] = columns(sight, poles + k);
         paints[poles[k].kind] = poles[k].paint;
     }
     for (int64_t column = 0; column < width; column++) {
-        double rx, ry;
-        int axis;
-        ray(sight, (double)column, &rx, &ry);
-        double wall = sim_wall(map, sight->x, sight->y, rx, ry, FARTHEST, &axis);
+        const int64_t n = column % SIM_CHUNK;
+        if (n == 0) {
+            rays.count = (size_t)(width - column < SIM_CHUNK ? width - column : SIM_CHUNK);
+            for (size_t m = 0; m < rays.count; m++) {
+                rays.x[m] = sight->x;
+                rays.y[m] = sight->y;
+                ray(sight, (double)(column + (int64_t)m), rays.rx + m, rays.ry + m);
+            }
+            sim_walls(map, &rays, FARTHEST, walls, axes);
+        }
+        const double rx = rays.rx[n], ry = rays.ry[n];
+        double wall = walls[n];
         size_t found = meet_all(sight, poles, count, column, rx, ry, scratch);
         made = cut(sight, poles, found, wall, column, rx, ry, scratch, made);
 
@@ -411,7 +422,7 @@ void sim_paint(const sim_map *map, const sim_sight *sight, const sim_pole *poles
         scratch->tops[column] = (int16_t)clamped(top, 0, height);
         scratch->bottoms[column] = (int16_t)clamped(bottom, -1, height - 1);
         scratch->lumas[column] =
-            (uint8_t)(150 - (dark > 70 ? 70 : dark) - (axis == 1 ? 14 : 0));
+            (uint8_t)(150 - (dark > 70 ? 70 : dark) - (axes[n] == 1 ? 14 : 0));
     }
     room(sight, scratch, picture);
     memset(picture + width * height, 128, (size_t)(width * height / 2));

@@ -191,21 +191,33 @@ void sim_sonar(const sim_map *map, const sim_disc *discs, size_t count, const si
     const double c = ring->cosine, s = ring->sine, most = ring->most;
     sim_disc *close = near + count;
     size_t candidates = about(discs, count, ring, close);
+    sim_rays rays;
+    double walls[SIM_CHUNK];
+    uint8_t axes[SIM_CHUNK];
 
     for (size_t k = 0; k < ring->sensors; k++) {
-        const double *sensor = ring->geometry + k * SIM_SENSOR;
-        double ox = ring->x + c * sensor[0] - s * sensor[1];
-        double oy = ring->y + s * sensor[0] + c * sensor[1];
+        const size_t in_chunk = k % (SIM_CHUNK / SIM_RAYS);
+        if (in_chunk == 0) {
+            rays.count = 0;
+            for (size_t m = k; m < ring->sensors && rays.count + SIM_RAYS <= SIM_CHUNK; m++) {
+                const double *sensor = ring->geometry + m * SIM_SENSOR;
+                for (size_t n = 0; n < SIM_RAYS; n++, rays.count++) {
+                    double dx = sensor[2 + 2 * n], dy = sensor[3 + 2 * n];
+                    rays.x[rays.count] = ring->x + c * sensor[0] - s * sensor[1];
+                    rays.y[rays.count] = ring->y + s * sensor[0] + c * sensor[1];
+                    rays.rx[rays.count] = c * dx - s * dy;
+                    rays.ry[rays.count] = s * dx + c * dy;
+                }
+            }
+            sim_walls(map, &rays, most, walls, axes);
+        }
+        const size_t first = in_chunk * SIM_RAYS;
+        size_t found = around(close, candidates, SIZE_MAX, rays.x[first], rays.y[first], most, near);
         double best = most;
-        size_t found = around(close, candidates, SIZE_MAX, ox, oy, most, near);
 
-        for (size_t n = 0; n < SIM_RAYS; n++) {
-            double dx = sensor[2 + 2 * n], dy = sensor[3 + 2 * n];
-            double rx = c * dx - s * dy, ry = s * dx + c * dy;
-            int axis;
-            best = meet_discs(near, found, rx, ry, best);
-            double t = sim_wall(map, ox, oy, rx, ry, best, &axis);
-            best = t < best ? t : best;
+        for (size_t n = first; n < first + SIM_RAYS; n++) {
+            best = meet_discs(near, found, rays.rx[n], rays.ry[n], best);
+            best = walls[n] < best ? walls[n] : best;
         }
         if (noise->on && best < most) {
             uint32_t hash =
@@ -246,13 +258,25 @@ void sim_scan(const sim_map *map, const sim_disc *discs, size_t count, const sim
     double oy = lidar->y + s * at[0] + c * at[1];
     size_t found = around(discs, count, lidar->self, ox, oy, most, near);
 
+    sim_rays rays;
+    double walls[SIM_CHUNK];
+    uint8_t axes[SIM_CHUNK];
+
     for (size_t k = 0; k < lidar->rays; k++) {
-        double dx = at[2 + 2 * k], dy = at[3 + 2 * k];
-        double rx = c * dx - s * dy, ry = s * dx + c * dy;
-        int axis;
-        double best = meet_discs(near, found, rx, ry, most);
-        double t = sim_wall(map, ox, oy, rx, ry, best, &axis);
-        uint32_t mm = measured(lidar, noise, k, t < best ? t : best);
+        const size_t n = k % SIM_CHUNK;
+        if (n == 0) {
+            rays.count = lidar->rays - k < SIM_CHUNK ? lidar->rays - k : SIM_CHUNK;
+            for (size_t m = 0; m < rays.count; m++) {
+                double dx = at[2 + 2 * (k + m)], dy = at[3 + 2 * (k + m)];
+                rays.x[m] = ox;
+                rays.y[m] = oy;
+                rays.rx[m] = c * dx - s * dy;
+                rays.ry[m] = s * dx + c * dy;
+            }
+            sim_walls(map, &rays, most, walls, axes);
+        }
+        double best = meet_discs(near, found, rays.rx[n], rays.ry[n], most);
+        uint32_t mm = measured(lidar, noise, k, walls[n] < best ? walls[n] : best);
         ranges[2 * k] = (uint8_t)(mm >> 8);
         ranges[2 * k + 1] = (uint8_t)(mm & 255);
     }

@@ -1,4 +1,4 @@
-// sources: ../c_src/rays.c ../c_src/paint.c
+// sources: ../c_src/rays.c ../c_src/walls.c ../c_src/paint.c
 /* Random plans, sonars and pictures under the sanitizers: no access outside, no endless ray,
  * and what the geometry promises. */
 #include <math.h>
@@ -92,6 +92,27 @@ static void rays(const sim_map *map)
         double t = sim_wall(map, place(map->width, map->cell), place(map->height, map->cell), rx,
                             ry, most, &axis);
         CHECK(t >= 0.0 && t <= most && axis >= 0 && axis <= 2);
+    }
+}
+
+/* Many rays at once go as far as each alone, to the bit. */
+static void together(const sim_map *map)
+{
+    double most = draw() % 2 ? unit() * 30 : 1.0e6, goes[SIM_CHUNK];
+    uint8_t axes[SIM_CHUNK];
+    sim_rays many;
+
+    many.count = draw() % (SIM_CHUNK + 1);
+    for (size_t k = 0; k < many.count; k++) {
+        many.x[k] = place(map->width, map->cell);
+        many.y[k] = place(map->height, map->cell);
+        direction(many.rx + k, many.ry + k);
+    }
+    sim_walls(map, &many, most, goes, axes);
+    for (size_t k = 0; k < many.count; k++) {
+        int axis;
+        double t = sim_wall(map, many.x[k], many.y[k], many.rx[k], many.ry[k], most, &axis);
+        CHECK(memcmp(&t, goes + k, sizeof t) == 0 && axis == axes[k]);
     }
 }
 
@@ -222,6 +243,7 @@ int main(void)
             CHECK(map.field[j * map.width + i] == king(walls, map.width, map.height, i, j));
         }
         rays(&map);
+        together(&map);
         sonars(&map);
         pictures(&map, tables);
         free(walls);

@@ -13,6 +13,7 @@ defmodule Console.Live do
           | {:formation, {atom(), float() | nil}}
           | {:landmark, Pose.point() | :none}
           | {:place, (robot :: atom()) | (object :: String.t()), Pose.point()}
+          | {:program, robot :: atom(), :start | :end, name :: String.t()}
           | {:tell, target(), Robot.Command.t() | {:replace, mission :: String.t()}}
           | :estop
           | :reset
@@ -68,6 +69,11 @@ defmodule Console.Live do
   """
   @callback messages(live :: term()) :: {:ok, [Lab.Messages.entry()]} | {:error, String.t()}
 
+  @doc """
+  Its nodes, with the robots and programs there; the error says in one line why that is not known here.
+  """
+  @callback nodes(live :: term()) :: {:ok, [Console.Nodes.row()]} | {:error, String.t()}
+
   # A recording has these, too.
 
   @typedoc """
@@ -108,6 +114,7 @@ defmodule Console.Live do
                       about: 2,
                       statuses: 1,
                       messages: 1,
+                      nodes: 1,
                       answer: 2,
                       history: 2,
                       beside: 1

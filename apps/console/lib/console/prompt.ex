@@ -13,7 +13,7 @@ defmodule Console.Prompt do
   alias Swarm.{BehaviourRegistry, MissionRegistry}
 
   @object ~r/\A(ball|box)\d{1,4}\z/
-  @words ~w(kill formation landmark move place goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
+  @words ~w(kill formation landmark move place goto follow drive gamepad stop estop reset start run program replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -149,6 +149,8 @@ defmodule Console.Prompt do
       ["start", name] -> if name in names, do: MissionRegistry.names(), else: []
       ["run"] -> names
       ["run", name] -> if name in names, do: BehaviourRegistry.names(), else: []
+      ["program"] -> names
+      ["program", _name] -> ["start", "end"]
       ["replace"] -> MissionRegistry.names() ++ ["all" | names]
       ["replace", name] -> if name in ["all" | names], do: MissionRegistry.names(), else: []
       ["gamepad"] -> ["off" | names]
@@ -190,6 +192,7 @@ defmodule Console.Prompt do
         "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "run mag2 NAME                 one robot runs a behaviour of your own",
+        "program mag2 start battery    starts a program on a robot, or ends it",
         "estop, or F8; reset           emergency stop of all, until the reset",
         "keep, keep mag2               their last minute is written as a recording",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
@@ -295,6 +298,17 @@ defmodule Console.Prompt do
 
   defp command("run", _rest, _robots),
     do: {:error, "run needs a name and a behaviour: run mag1 #{behaviour()}"}
+
+  defp command("program", [name, what, program], robots) when what in ["start", "end"],
+    do:
+      with_robot(
+        name,
+        robots,
+        &{:program, &1, if(what == "end", do: :end, else: :start), program}
+      )
+
+  defp command("program", _rest, _robots),
+    do: {:error, "program needs a name, start or end, and a program: program mag1 start battery"}
 
   defp command("replace", [mission], robots), do: replace("all", mission, robots)
   defp command("replace", [who, mission], robots), do: replace(who, mission, robots)

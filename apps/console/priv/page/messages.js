@@ -1,5 +1,6 @@
 // What robots say to each other, as a grid: the newest last, what is said again in one row with its count.
 import { by, made, write } from "./dom.js";
+import { Watched } from "./watched.js";
 
 // The messages up to a time, of one robot (null: of all), the newest last. Pure.
 export function told(entries, at_s, chosen) {
@@ -7,31 +8,9 @@ export function told(entries, at_s, chosen) {
   return entries.filter((e) => e.at_s <= at_s + 0.1 && mine(e));
 }
 
-export class Messages {
-  constructor(ask) {
-    this.ask = ask; // (on): whether they are to be told
-    this.on = false;
-    this.entries = [];
-    this.why = null;
-    this.at_s = Infinity;
-    this.chosen = null;
-  }
-
-  open(on) {
-    if (on === this.on) return;
-    this.on = on;
-    this.ask(on);
-  }
-
-  // After the connection was lost.
-  again() {
-    if (this.on) this.ask(true);
-  }
-
-  hear({ entries, why }) {
-    [this.entries, this.why] = [entries, why];
-    this.draw();
-  }
+export class Messages extends Watched {
+  at_s = Infinity;
+  chosen = null;
 
   // Another robot, or another time.
   show({ at_s }, chosen) {

@@ -7,6 +7,7 @@ import { Events, Given } from "./events.js";
 import { Camera, about, nothing, one, open, tabs } from "./inspector.js";
 import { legend } from "./legend.js";
 import { Messages } from "./messages.js";
+import { Nodes } from "./nodes.js";
 import { Robots, apart, leads } from "./robots.js";
 import { Timeline } from "./timeline.js";
 
@@ -45,7 +46,9 @@ const events = new Events((id, at_s) => {
   if (at_s !== null) timeline.seek(at_s);
 });
 const given = new Given();
-const messages = new Messages((on) => socket?.readyState === WebSocket.OPEN && say(`messages ${on ? "on" : "off"}`));
+const watch = (what) => (on) => socket?.readyState === WebSocket.OPEN && say(`${what} ${on ? "on" : "off"}`);
+const messages = new Messages(watch("messages"));
+const nodes = new Nodes(watch("nodes"), say);
 const camera = new Camera(floor, (line) => answer({ ok: false, text: line }));
 
 // Beside this page, wherever a proxy puts it; with its token, if its address has one.
@@ -61,6 +64,7 @@ function connect() {
     connected(true);
     if (chosen) say(`look ${chosen}`);
     messages.again();
+    nodes.again();
   };
   socket.onmessage = ({ data }) => hear(JSON.parse(data));
   socket.onclose = () => {
@@ -97,8 +101,8 @@ const refuse = (text) => answer({ ok: false, text });
 function say(line) {
   if (socket?.readyState !== WebSocket.OPEN) return refuse(`not sent, because there is no connection: ${line}`);
   const stop = STOP.test(line);
-  if (silent() && !stop && !/^(look|messages)\b/.test(line)) return refuse(`not sent, because the fleet is not heard: ${line}`);
-  if (!/^(look|drive|messages)\b/.test(line) && !timeline.recorded) given.order(line);
+  if (silent() && !stop && !/^(look|messages|nodes (on|off))\b/.test(line)) return refuse(`not sent, because the fleet is not heard: ${line}`);
+  if (!/^(look|drive|messages|nodes (on|off))\b/.test(line) && !timeline.recorded) given.order(line);
   if (!silent()) return socket.send(`@${Math.round(performance.now() + ahead)} ${line}`);
   socket.send(line);
   if (stop) refuse("sent, but the fleet is not heard: look whether it stands, and press the robots' own buttons if it does not");
@@ -132,6 +136,7 @@ function hear(message) {
   } else if (message.t === "history") timeline.history(message);
   else if (message.t === "about") told(message);
   else if (message.t === "messages") messages.hear(message);
+  else if (message.t === "nodes") nodes.hear(message);
   else if (message.t === "answer") answer(message);
 }
 
@@ -318,7 +323,10 @@ by("command").onsubmit = (e) => {
 
 follows("mission", "shape", "spacing", "speed");
 reasons();
-tabs((id) => messages.open(id === "tab-messages"));
+tabs((id) => {
+  messages.open(id === "tab-messages");
+  nodes.open(id === "tab-nodes");
+});
 by("legend").ontoggle = () => legend(by("legend").querySelector("ul"));
 write(by("fleet"), "connecting …");
 connect();

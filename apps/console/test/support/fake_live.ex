@@ -66,6 +66,12 @@ defmodule Console.FakeLive do
   @impl Console.Live
   def messages(live), do: Agent.get(live, &Map.get(&1, :messages, {:ok, []}))
 
+  @impl Console.Live
+  def nodes(live), do: Agent.get(live, &Map.get(&1, :nodes, {:ok, []}))
+
+  @doc "Its nodes."
+  def place(live, nodes), do: Agent.update(live, &Map.put(&1, :nodes, nodes))
+
   @doc "What its robots have said to each other."
   def say(live, messages), do: Agent.update(live, &Map.put(&1, :messages, messages))
 

@@ -41,6 +41,40 @@ defmodule Lab.ExploreTest do
     assert Trial.result(trial).collisions == 0
   end
 
+  test "printed marks that robots read on the way are on the map, and in its file" do
+    at = [
+      {2, {7.98, -1.98, 180.0}},
+      {3, {-7.3, 5.98, -90.0}},
+      {5, {-3.4, -5.98, 90.0}},
+      {7, {2.1, 5.98, -90.0}},
+      {8, {7.3, 5.98, -90.0}},
+      {9, {-7.98, 0.2, 0.0}}
+    ]
+
+    options = [robots: [:mag1, :mag2, :mag3], seed: 1, duration_s: 90, marks: [size: 0.3, at: at]]
+    trial = options |> trial() |> Lab.Run.play()
+    mission = Swarm.Member.runner(Trial.robot(trial, :mag1)).mission
+    hung = Missions.Explore.FoundMarks.hung(mission.marks)
+    assert length(hung) >= 3
+    folder = Path.join(System.tmp_dir!(), "marks#{System.unique_integer([:positive])}")
+    File.mkdir_p!(folder)
+    on_exit(fn -> File.rm_rf!(folder) end)
+    file = Path.join(folder, "found.yaml")
+    :ok = Nav.MapFile.save(file, Missions.Explore.map(mission))
+    assert {:ok, %{marks: marks}} = Nav.MapFile.open(file)
+
+    for {id, {x, y, turn}} <- marks do
+      {true_x, true_y, degrees} = Map.fetch!(Map.new(at), id)
+      assert :math.sqrt((x - true_x) ** 2 + (y - true_y) ** 2) < 0.3
+      assert abs(Hal.Pose.wrap(turn - degrees * :math.pi() / 180)) < 0.1
+    end
+
+    # Whichever robot saw it, all have it.
+    other = Swarm.Member.runner(Trial.robot(trial, :mag3)).mission
+    ids = fn hung -> for({id, _at} <- hung, do: id) end
+    assert ids.(Missions.Explore.FoundMarks.hung(other.marks)) == ids.(hung)
+  end
+
   # Lanes one behind the other, each open at one end, in 12 x 10 m: a cell is 0.1 m.
   defp lanes(path, metres) do
     {width, height, lane} = {120, 100, round(metres * 10)}

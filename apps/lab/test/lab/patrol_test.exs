@@ -54,7 +54,8 @@ defmodule Lab.PatrolTest do
         {"hall", :off, 0.0, 1, :motivation},
         {"hall", :default, 0.0, 2, :motivation},
         {"arena", :default, 0.2, 3, :motivation},
-        {"arena", :default, 0.2, 3, :auction}
+        {"arena", :default, 0.2, 3, :auction},
+        {"arena", :default, 0.2, 3, :rules}
       ] do
     test "4 robots see every point each 120 s in #{map}, seed #{seed}, noise #{noise}, loss #{loss}, by #{by}, also when one dies" do
       kills = [{:mag2, 125}]

@@ -1,7 +1,7 @@
 defmodule Missions.Explore do
   @moduledoc """
   Explores: robots see all of a building that they do not know, and make its map together. Pure. Each robot keeps a map of what its sonars have seen and of what others tell (`Missions.Explore.SharedMap`), by the poses that
-  they estimate. Once a second it looks for the frontiers of what is known (`Nav.Frontiers`), chooses one (`.Choice`), and tells
+  they estimate, and where printed marks hang (`Missions.Explore.FoundMarks`). Once a second it looks for the frontiers of what is known (`Nav.Frontiers`), chooses one (`.Choice`), and tells
   the others to where it goes, how far that is, and what it has seen. Its ways are those of its map, whatever floor plan it
   has been given.
 
@@ -12,7 +12,7 @@ defmodule Missions.Explore do
   second time. Options: `Missions.Explore.Options`.
   """
   alias Hal.Pose
-  alias Missions.Explore.{Options, SharedMap}
+  alias Missions.Explore.{FoundMarks, Options, SharedMap}
   alias Nav.Frontiers
   alias Nav.Frontiers.Choice
 
@@ -47,6 +47,7 @@ defmodule Missions.Explore do
   defstruct @enforce_keys ++
               [
                 map: SharedMap.new(),
+                marks: %FoundMarks{},
                 home: nil,
                 now_ms: nil,
                 since_ms: nil,
@@ -79,6 +80,7 @@ defmodule Missions.Explore do
           me: atom(),
           within: float(),
           map: SharedMap.t(),
+          marks: FoundMarks.t(),
           home: Pose.point() | nil,
           now_ms: integer() | nil,
           since_ms: integer() | nil,
@@ -114,7 +116,8 @@ defmodule Missions.Explore do
 
   @impl Robot.Mission
   def messages do
-    {1,
+    {2,
+     mark: FoundMarks.table(),
      seen: [
        goal: [{:or, nil, @place}, required: true],
        far_mm: [{:integer, 0, 10_000_000, "mm"}, required: true],
@@ -129,13 +132,18 @@ defmodule Missions.Explore do
   # The map is what a stop must not lose.
   @impl Robot.Mission
   def halted(mission),
-    do: struct!(__MODULE__, mission |> Map.take([:me, :within, :map, :home]) |> Map.to_list())
+    do:
+      struct!(
+        __MODULE__,
+        mission |> Map.take([:me, :within, :map, :marks, :home]) |> Map.to_list()
+      )
 
   @impl Robot.Mission
-  def map(mission), do: SharedMap.raster(mission.map)
+  def map(mission),
+    do: mission.map |> SharedMap.raster() |> Map.put(:marks, FoundMarks.hung(mission.marks))
 
   @impl Robot.Mission
-  def layer(mission), do: [SharedMap.layer(mission.map)]
+  def layer(mission), do: [SharedMap.layer(mission.map) | FoundMarks.layer(mission.marks)]
 
   @impl Robot.Mission
   def handle({:command, :start}, mission), do: result(%{mission | started?: true}, [])
@@ -143,6 +151,9 @@ defmodule Missions.Explore do
   def handle({:message, %{kind: :seen, from: from, body: body}}, %{now_ms: now_ms} = mission)
       when now_ms != nil,
       do: result(hear(mission, from, Map.new(body)), [])
+
+  def handle({:message, %{kind: :mark, from: from, body: body}}, mission),
+    do: result(%{mission | marks: FoundMarks.hear(mission.marks, from, Map.new(body))}, [])
 
   def handle({:outcome, {:go, n}, outcome}, %{goal: n} = mission) do
     mission = %{mission | goal: n + 1}
@@ -157,7 +168,8 @@ defmodule Missions.Explore do
       | now_ms: percept.at_ms,
         since_ms: mission.since_ms || percept.at_ms,
         home: mission.home || Pose.point(percept.pose),
-        map: SharedMap.look(mission.map, percept)
+        map: SharedMap.look(mission.map, percept),
+        marks: FoundMarks.look(mission.marks, percept)
     }
 
     {mission, effects} = mission |> move(Pose.point(percept.pose)) |> plan(percept)
@@ -246,7 +258,11 @@ defmodule Missions.Explore do
     }
 
     {told, map} = SharedMap.tell(mission.map)
-    {%{mission | map: map}, stages ++ [{:tell, :all, :seen, said(target, told)}]}
+    {mark, marks} = FoundMarks.tell(mission.marks)
+    mark = if mark, do: [{:tell, :all, :mark, mark}], else: []
+
+    {%{mission | map: map, marks: marks},
+     stages ++ [{:tell, :all, :seen, said(target, told)}] ++ mark}
   end
 
   # Where much of the edge is unknown, what seems too narrow is tried, too, when nothing else is left.

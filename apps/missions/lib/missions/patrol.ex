@@ -1,7 +1,7 @@
 defmodule Missions.Patrol do
   @moduledoc """
   Patrols: points are visited for ever by a fleet without a leader, by ALLIANCE's motivations
-  (`Missions.Patrol.Motivation`) or by auction (`Missions.Patrol.Auction`). Pure; written with the interface of
+  (`Missions.Patrol.Motivation`), by auction (`Missions.Patrol.Auction`) or by rules (`Missions.Patrol.Helping`). Pure; written with the interface of
   `Robot.Mission` alone.
 
   A point is due when no robot has seen it for a quarter of the `period`; a robot within 0.5 m of it sees it. Each robot
@@ -13,7 +13,7 @@ defmodule Missions.Patrol do
   within the period. Options: `Missions.Patrol.Options`.
   """
   alias Hal.Pose
-  alias Missions.Patrol.{Ages, Auction, Motivation, Options}
+  alias Missions.Patrol.{Ages, Auction, Helping, Motivation, Options}
 
   @behaviour Robot.Mission
 
@@ -42,20 +42,21 @@ defmodule Missions.Patrol do
                 told_ms: nil,
                 told: nil,
                 why: nil,
+                because: nil,
                 started?: false
               ]
 
   @typedoc """
   `points` by number; `plan` is their number in 28 bits, so that only robots with the same points understand each other;
   `seen` and `aside` are times by point: when it was last seen, until when it is left to others; `why` it gave up its last
-  point.
+  point; `because` are the lines of the rules by which it took its point.
   """
   @type t :: %__MODULE__{
           me: atom(),
           points: %{non_neg_integer() => Pose.point()},
           plan: non_neg_integer(),
           period_ms: pos_integer(),
-          by: :motivation | :auction,
+          by: :motivation | :auction | :rules,
           now_ms: integer() | nil,
           seen: %{non_neg_integer() => integer()},
           aside: %{non_neg_integer() => integer()},
@@ -65,6 +66,7 @@ defmodule Missions.Patrol do
           told_ms: integer() | nil,
           told: non_neg_integer() | nil,
           why: String.t() | nil,
+          because: [String.t()] | nil,
           started?: boolean()
         }
 
@@ -131,8 +133,8 @@ defmodule Missions.Patrol do
     mission = %{mission | now_ms: percept.at_ms} |> look(percept.pose) |> prune()
     tasks = tasks(mission, percept.pose)
 
-    motivation = choose(mission, tasks, percept, step_ms)
-    mission = taken(%{mission | motivation: motivation}, before)
+    {motivation, because} = choose(mission, tasks, percept, step_ms)
+    mission = taken(%{mission | motivation: motivation}, before, because)
     {mission, told} = tell(mission, percept.pose)
     stages = if motivation.active != before, do: taken_over(mission), else: []
     result(mission, stages ++ told ++ [goal(mission), {:look, 0.0}, {:claim, claim(mission)}])
@@ -148,9 +150,11 @@ defmodule Missions.Patrol do
     [
       {"at point",
        if(mission.motivation.active, do: "#{mission.motivation.active + 1}", else: "none")},
-      {"points, seconds since seen", Enum.join(ages, " ")},
-      {"motivations", if(m == [], do: "none", else: Enum.join(m, ", "))}
-    ]
+      {"points, seconds since seen", Enum.join(ages, " ")}
+    ] ++
+      if mission.by == :rules,
+        do: for(line <- mission.because || [], do: {"took it because", String.trim(line)}),
+        else: [{"motivations", if(m == [], do: "none", else: Enum.join(m, ", "))}]
   end
 
   @impl Robot.Mission
@@ -209,7 +213,7 @@ defmodule Missions.Patrol do
   end
 
   defp choose(%{by: :motivation, motivation: m} = mission, tasks, %{at_ms: at_ms}, step_ms),
-    do: Motivation.tick(m, mission.me, tasks, mission.peers, at_ms, step_ms)
+    do: {Motivation.tick(m, mission.me, tasks, mission.peers, at_ms, step_ms), nil}
 
   defp choose(%{motivation: m} = mission, tasks, %{at_ms: at_ms, peers: places}, _step_ms) do
     bids =
@@ -217,7 +221,9 @@ defmodule Missions.Patrol do
         {id, Map.new(mission.points, fn {n, point} -> {n, Pose.distance(pose, point)} end)}
       end
 
-    Auction.tick(m, mission.me, tasks, mission.peers, at_ms, bids)
+    if mission.by == :rules,
+      do: Helping.tick(m, mission.me, tasks, mission.peers, at_ms, bids),
+      else: {Auction.tick(m, mission.me, tasks, mission.peers, at_ms, bids), nil}
   end
 
   # A point that no robot has ever seen has been due for ever.
@@ -234,10 +240,12 @@ defmodule Missions.Patrol do
   end
 
   # Each visit has a tag of its own, so that the outcome of a former one is not taken for its.
-  defp taken(%{motivation: %{active: active}} = mission, before) when active in [nil, before],
-    do: mission
+  defp taken(%{motivation: %{active: active}} = mission, before, _because)
+       when active in [nil, before],
+       do: mission
 
-  defp taken(mission, _before), do: %{mission | visits: mission.visits + 1, why: nil}
+  defp taken(mission, _before, because),
+    do: %{mission | visits: mission.visits + 1, why: nil, because: because}
 
   defp taken_over(%{motivation: %{active: nil}}), do: []
 

@@ -356,7 +356,7 @@ defmodule Swarm.MemberTest do
     {searches, []} = member() |> sense(100) |> Member.step(picture.(200))
     assert %{phase: :search} = searches.lockstep.roles.pilot.runner
     evaluated = {Robot.Percept.Sighting, :bearing, 3}
-    cautious = {Robot.Behaviour.Avoid.Caution, :check, 3}
+    cautious = {Robot.Behaviour.Avoid.Caution, :check, 4}
 
     assert calls([evaluated, cautious], fn -> Member.step(searches, {:tick, 200}) end) ==
              %{evaluated => 1, cautious => 1}

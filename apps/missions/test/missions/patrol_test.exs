@@ -81,6 +81,45 @@ defmodule Missions.PatrolTest do
     assert tick.(%Motivation{active: 0}, %{mag2: peer(0, far: 1.0)}, bids, 0) == 1
   end
 
+  test "by rules the nearest free robot helps one that is silent or stuck first, and says why" do
+    alias Missions.Patrol.Helping
+    tasks = [task(0, far: 3.0), task(1, far: 4.0)]
+
+    tick = fn m, peers, bids, now ->
+      {motivation, why} = Helping.tick(m, :mag1, tasks, peers, now, bids)
+      {motivation.active, why}
+    end
+
+    # The nearest point; a silent robot's first; not one at which a robot is, until that has been there for 30 s.
+    assert {0, [line | because]} = tick.(%Motivation{}, %{}, %{}, 0)
+    assert line == ~s|take(mag1, 0), by "the nearest free robot takes a point that is due"|
+    assert "  due(0)" in because and "  near(3.0, mag1, 0)" in because
+    silent = %{mag2: peer(1, at_ms: 0)}
+    assert {1, [line | because]} = tick.(%Motivation{}, silent, %{}, @tau_ms)
+    assert line =~ "the nearest free robot helps"
+    assert Enum.any?(because, &(&1 =~ "silent(mag2, 1)"))
+    busy = fn ms -> %{mag2: peer(0, far: 5.0, busy_ms: ms)} end
+    assert {1, _why} = tick.(%Motivation{}, busy.(29_000), %{}, 0)
+    assert {0, [_take | because]} = tick.(%Motivation{}, busy.(30_000), %{}, 0)
+    assert Enum.any?(because, &(&1 =~ "visits(mag2, 0, 30)"))
+
+    # A nearer free robot helps; one whose place is not known does not.
+    near = %{mag3: %{0 => 1.0, 1 => 1.0}}
+    both = Map.put(silent, :mag3, peer(nil, at_ms: @tau_ms))
+    assert {0, _why} = tick.(%Motivation{}, both, near, @tau_ms)
+    assert {1, _why} = tick.(%Motivation{}, both, %{}, @tau_ms)
+
+    # One that has a point keeps it, and draws no conclusion.
+    assert {0, nil} = tick.(%Motivation{active: 0}, silent, %{}, @tau_ms)
+  end
+
+  test "by rules a robot says why it took its point" do
+    {runner, _effects} = tick(patrol(by: :rules), 0)
+    {runner, _effects} = tick(runner, 100)
+    why = for {"took it because", line} <- Patrol.explain(runner.mission), do: line
+    assert [~s|take(mag1, | <> _, "near(" <> _, "due(" <> _] = why
+  end
+
   defp patrol(options \\ []) do
     {:ok, options} = Options.check(options, Patrol.option_table(), "patrol")
     {runner, []} = Runner.start(Runner.new(:mag1), Patrol, options)

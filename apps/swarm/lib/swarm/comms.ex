@@ -95,8 +95,10 @@ defmodule Swarm.Comms do
         }
 
   @doc """
-  Adds to the config of a robot this role, through which its mission sends messages, and the
-  e-stop, which its gate notifies of its latch.
+  Adds to the config of a robot this role, through which its mission sends messages, the
+  e-stop, which its gate notifies of its latch, and the companions that the configuration gives each robot, of apps above this one:
+
+      config :swarm, companions: [{Agents.Programs, battery: Agents.Battery}]
   """
   @spec join(Robot.Config.t(), keyword()) :: Robot.Config.t()
   def join(%Robot.Config{} = config, options \\ []) do
@@ -110,9 +112,16 @@ defmodule Swarm.Comms do
           EStop.entry(),
           {__MODULE__, []},
           {Directory.Entry, role: :comms, as: :robot, all: attended(config)}
-        ]
+        ] ++ of_build()
 
     %{config | transport: options[:transport], boot: options[:boot], companions: companions}
+  end
+
+  # A release may hold less than the configuration names.
+  defp of_build do
+    for {module, options} <- Application.get_env(:swarm, :companions, []),
+        Code.ensure_loaded?(module),
+        do: {module, options}
   end
 
   defp attended(%{presence: nil}), do: []

@@ -84,6 +84,14 @@ defmodule Swarm.Directory do
       else: []
   end
 
+  @doc "The services of each robot that offers any (`Agents.Responder`), sorted by the robots."
+  @spec services() :: [{robot :: atom(), [service :: atom(), ...]}]
+  def services do
+    groups = if running?(), do: :pg.which_groups(__MODULE__), else: []
+    offers = for {:service, service, robot} <- Enum.sort(groups), do: {robot, service}
+    offers |> Enum.group_by(&elem(&1, 0), &elem(&1, 1)) |> Enum.sort()
+  end
+
   # The groups are read from a table that disappears with the scope.
   defp sorted(group),
     do: if(running?(), do: Enum.sort(:pg.get_members(__MODULE__, group)), else: [])

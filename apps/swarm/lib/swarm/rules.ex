@@ -163,8 +163,11 @@ defmodule Swarm.Rules do
     end
   end
 
+  # What a later round proposes by a rule that is worth more counts.
   defp found(next, kind, fact, rule, because) do
-    if is_map_key(next.found, {kind, fact}) do
+    before = next.found[{kind, fact}]
+
+    if before && (kind == :conclude or before.priority >= rule.priority) do
       next
     else
       conclusion = %{

@@ -40,6 +40,31 @@ defmodule Swarm.RulesTest do
         do: assert(Rules.run(Help.rules(), facts) == Rules.run(Help.rules(), @facts))
   end
 
+  test "what two rules propose has the greater priority, also where its grounds are concluded later" do
+    {:ok, rules} =
+      Rules.Reader.text("""
+      rule "near" do
+        at(robot)
+        propose go(robot)
+      end
+      rule "called", priority: 5 do
+        called(robot)
+        propose go(robot)
+      end
+      rule "heard", priority: 1 do
+        heard(robot)
+        conclude called(robot)
+      end
+      """)
+
+    {:ok, result} = Rules.run(rules, at: 1, at: 2, heard: 2)
+
+    assert [%{fact: {"go", 2}, priority: 5, rule: "called"}, %{fact: {"go", 1}, priority: 0}] =
+             result.proposals
+
+    assert [~s|go(2), by "called"| | _because] = Rules.why(result, {:go, 2})
+  end
+
   test "a conclusion vanishes with its grounds, and absent looks at what was given" do
     assert proposed(Rules.run(Help.rules(), tl(@facts))) == [{"wait", :mag2}, {"wait", :mag3}]
     visited = [{:visits, :min1, 3} | @facts]

@@ -1,23 +1,30 @@
 defmodule Bench.Scale do
   @moduledoc """
-  Measures what a robot costs in fleets of different sizes: `mix bench scale`. A run in lockstep, from the search on and in a
-  process of its own, is measured in what all robots together took, divided by their number and that of the steps (100 ms).
+  Measures what a robot costs in fleets of different sizes: `mix bench scale`. A whole mission in lockstep, from the search until the
+  fleet has been in formation for ten seconds, in a process of its own, is measured in what all robots together took, divided by their
+  number and that of the steps (100 ms).
   """
   alias Lab.Trial
 
+  # Steps of 100 ms.
+  @after_formed 100
+
   @typedoc """
-  Of one fleet: the reductions of the VM and the processor time for a robot in a step, the speed against real time, and
-  the memory of the run at its end.
+  Of one fleet: the reductions of the VM and the processor time for a robot in a step, the simulated seconds that a second of processor
+  time plays, the memory of the run at its end; how many simulated seconds were measured, and when the fleet was formed (`nil`: not within
+  these).
   """
   @type measured :: %{
           robots: pos_integer(),
+          seconds: float(),
+          formed_s: float() | nil,
           reductions: float(),
           cpu_us: float(),
           speed: float(),
           bytes: pos_integer()
         }
 
-  @doc "Measures one fleet for so many simulated seconds; the error is one line of `Lab.Trial.new/1`."
+  @doc "Measures a mission of one fleet, and no more than so many simulated seconds of it; the error is one line of `Lab.Trial.new/1`."
   @spec measure(pos_integer(), :painted | :direct, pos_integer()) ::
           {:ok, measured()} | {:error, line :: String.t()}
   def measure(robots, blobs, seconds) do
@@ -31,23 +38,34 @@ defmodule Bench.Scale do
   defp run(setup, steps) do
     robots = length(setup.options.robots)
     Trial.Memory.prepare(robots)
-    before = {work(), cpu_ms(), System.monotonic_time(:microsecond)}
-    trial = Enum.reduce(1..steps, Trial.begin(setup), fn _step, trial -> Trial.step(trial) end)
+    before = {work(), cpu_ms()}
+    {trial, steps, formed} = play(Trial.begin(setup), 0, steps, nil)
     measured = figures(before, robots, steps)
     # Alive until here.
     _living = Trial.living(trial)
-    measured
+    Map.put(measured, :formed_s, formed && formed / 10)
   end
 
-  defp figures({work, cpu_ms, since_us}, robots, steps) do
+  defp play(trial, step, most, formed)
+       when step == most or (formed != nil and step == formed + @after_formed),
+       do: {trial, step, formed}
+
+  defp play(trial, step, most, formed) do
+    trial = Trial.step(trial)
+    formed = formed || if(Trial.formed?(trial), do: step + 1)
+    play(trial, step + 1, most, formed)
+  end
+
+  defp figures({work, cpu_ms}, robots, steps) do
     {:memory, bytes} = Process.info(self(), :memory)
-    wall_us = System.monotonic_time(:microsecond) - since_us
+    spent_ms = max(cpu_ms() - cpu_ms, 1)
 
     %{
       robots: robots,
+      seconds: steps / 10,
       reductions: (work() - work) / (robots * steps),
-      cpu_us: 1_000 * (cpu_ms() - cpu_ms) / (robots * steps),
-      speed: 100_000 * steps / wall_us,
+      cpu_us: 1_000 * spent_ms / (robots * steps),
+      speed: 100 * steps / spent_ms,
       bytes: bytes
     }
   end
@@ -63,13 +81,13 @@ defmodule Bench.Scale do
   end
 
   @doc """
-  One line about what this machine manages in real time, as measured.
+  One line about what one core of this machine manages in real time, as measured.
 
-      iex> one = fn robots, speed -> %{robots: robots, speed: speed, reductions: 1.0, cpu_us: 1.0, bytes: 1} end
+      iex> one = fn robots, speed -> %{robots: robots, speed: speed} end
       iex> Bench.Scale.verdict([one.(6, 41.0), one.(50, 1.1), one.(100, 0.1)])
-      "In real time this machine plays fleets of 6 and 50 robots, and not one of 100 (0.10 times)."
+      "In real time one core of this machine plays fleets of 6 and 50 robots, and not one of 100 (0.10 times)."
       iex> Bench.Scale.verdict([one.(6, 41.0)])
-      "In real time this machine plays a fleet of 6 robots."
+      "In real time one core of this machine plays a fleet of 6 robots."
   """
   @spec verdict([measured(), ...]) :: String.t()
   def verdict(all) do
@@ -84,7 +102,7 @@ defmodule Bench.Scale do
 
     missed = for one <- unable, do: "#{one.robots} (#{decimals(one.speed, 2)} times)"
 
-    "In real time this machine plays #{played}" <>
+    "In real time one core of this machine plays #{played}" <>
       if(missed == [], do: "", else: ", and not one of #{list(missed)}") <> "."
   end
 
@@ -97,6 +115,7 @@ defmodule Bench.Scale do
 
   @heads [
     "robots",
+    "formed after (s)",
     "times real time",
     "processor time a robot-step (us)",
     "against the smallest fleet",
@@ -112,6 +131,7 @@ defmodule Bench.Scale do
       for one <- all do
         [
           one.robots,
+          if(one.formed_s, do: decimals(one.formed_s, 1), else: "not in #{round(one.seconds)}"),
           decimals(one.speed, 2),
           decimals(one.cpu_us, 0),
           decimals(one.cpu_us / max(least.cpu_us, 1.0), 2),

@@ -35,16 +35,29 @@ defmodule Bench.ScaleTest do
 
   test "the table compares with the smallest fleet, and bars show it" do
     one = fn robots, cpu_us ->
-      %{robots: robots, reductions: 10.0 * cpu_us, cpu_us: cpu_us, speed: 2.0, bytes: 4_000_000}
+      %{
+        robots: robots,
+        seconds: 120.0,
+        formed_s: if(robots < 50, do: 34.2),
+        reductions: 10.0 * cpu_us,
+        cpu_us: cpu_us,
+        speed: 2.0,
+        bytes: 4_000_000
+      }
     end
 
     text = Scale.draw([one.(6, 100.0), one.(50, 250.0)])
-    assert text =~ "| 50 | 2.00 | 250 | 2.50 | 2500 | 2.50 | 4 |"
+    assert text =~ "| 6 | 34.2 | 2.00 |"
+    assert text =~ "| 50 | not in 120 | 2.00 | 250 | 2.50 | 2500 | 2.50 | 4 |"
     assert text =~ "    6 robots #{String.duplicate("█", 20)} 100 us\n"
   end
 
-  test "a measurement is of all robots and steps" do
-    assert {:ok, %{robots: 2, reductions: work, speed: speed}} = Scale.measure(2, :direct, 1)
+  test "a measurement is of all robots and steps, and ends ten seconds after they are formed" do
+    assert {:ok, %{robots: 2, reductions: work, speed: speed, seconds: 1.0, formed_s: nil}} =
+             Scale.measure(2, :direct, 1)
+
     assert work > 1_000 and speed > 0
+    assert {:ok, %{seconds: seconds, formed_s: formed_s}} = Scale.measure(1, :direct, 60)
+    assert_in_delta seconds, formed_s + 10, 0.01
   end
 end

@@ -5,7 +5,7 @@ defmodule Console.Live.Fleet do
   """
   @behaviour Console.Live
   alias Console.Cli.Format
-  alias Console.About
+  alias Console.{About, Nodes}
   alias Lab.Fleet
 
   @doc "Starts a fleet; the error says in one line what is wrong with its options."
@@ -52,6 +52,9 @@ defmodule Console.Live.Fleet do
   @impl Console.Live
   def messages(live), do: Fleet.messages(live)
 
+  @impl Console.Live
+  def nodes(live), do: {:ok, live |> Fleet.living() |> Nodes.look()}
+
   # A process of its own has its board there.
   defp elsewhere(robot, living) do
     with true <- robot in living, %Swarm.Status{} = status <- Swarm.status(robot) do
@@ -85,6 +88,7 @@ defmodule Console.Live.Fleet do
     with :ok <- on_floor(command, Fleet.scene(live).map), do: Swarm.tell(target, command)
   end
 
+  defp carry_out({:program, robot, what, name}, _live), do: Nodes.order(robot, what, name)
   defp carry_out(:estop, _live), do: Swarm.estop()
   defp carry_out(:reset, _live), do: Swarm.reset()
 

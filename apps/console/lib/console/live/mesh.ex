@@ -9,7 +9,7 @@ defmodule Console.Live.Mesh do
   """
   use GenServer
   alias Console.Live.Mesh.{Notice, View}
-  alias Console.About
+  alias Console.{About, Nodes}
   alias Hal.Ticker
   alias Swarm.Status
   @behaviour Console.Live
@@ -45,10 +45,10 @@ defmodule Console.Live.Mesh do
   def result(_live), do: %{}
 
   @impl Console.Live
-  def lines(_live) do
-    for {node, seen} <- Enum.sort(Mesh.view().nodes),
-        do: "#{node}: #{seen.status}, robots: #{Enum.join(seen.robots, ", ")}"
-  end
+  def lines(live), do: live |> robots() |> Nodes.look() |> Nodes.lines()
+
+  @impl Console.Live
+  def nodes(live), do: {:ok, live |> robots() |> Nodes.look()}
 
   @impl Console.Live
   def statuses(live), do: GenServer.call(live, :statuses)
@@ -88,6 +88,7 @@ defmodule Console.Live.Mesh do
   defp carry_out({:tell, target, command}), do: Swarm.tell(target, command)
   defp carry_out({:formation, {kind, nil}}), do: Swarm.formation(kind)
   defp carry_out({:formation, {kind, spacing}}), do: Swarm.formation(kind, spacing: spacing)
+  defp carry_out({:program, robot, what, name}), do: Nodes.order(robot, what, name)
   defp carry_out(:estop), do: Swarm.estop()
   defp carry_out(:reset), do: Swarm.reset()
   defp carry_out({word, _what}), do: {:error, "#{word} is for simulated fleets only"}

@@ -45,6 +45,8 @@ defmodule Console.Live.Trial do
   def scene(live), do: GenServer.call(live, :scene, :infinity)
 
   @impl Console.Live
+  def command(_live, {:program, _robot, _what, _name}), do: no_nodes()
+
   def command(live, command) do
     given_us = Swarm.Commands.Client.given_us()
     GenServer.call(live, {:command, command, given_us}, :infinity)
@@ -81,6 +83,14 @@ defmodule Console.Live.Trial do
 
   @impl Console.Live
   def messages(live), do: {:ok, Messages.list(GenServer.call(live, :messages, :infinity))}
+
+  @impl Console.Live
+  def nodes(_live), do: no_nodes()
+
+  defp no_nodes,
+    do:
+      {:error,
+       "robots in lockstep are no processes, and run no programs; those of a live demo do"}
 
   @impl GenServer
   def init({module, trial, pace, recorder}) do

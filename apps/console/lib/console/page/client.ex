@@ -1,14 +1,14 @@
 defmodule Console.Page.Client do
   @moduledoc false
-  # Tells the page of the robot that a person looks at there, five times a second, and of the messages between robots, twice a
-  # second where these are looked at.
+  # Tells the page of the robot that a person looks at there, five times a second, and of the messages between robots or of the
+  # nodes, where these are looked at. A node that does not answer delays nothing else.
   use GenServer
   alias Console.Page.{Feed, State}
   alias Console.About
 
   @about_ms 200
   @history_ms 500
-  @messages_ms 500
+  @watched %{messages: 500, nodes: 1_000}
 
   @doc """
   Starts it for the connection of the caller, and linked to it: without one of them the other is of no use, and the page
@@ -21,9 +21,9 @@ defmodule Console.Page.Client do
   @spec look(pid(), atom() | nil) :: :ok
   def look(client, robot), do: GenServer.cast(client, {:look, robot})
 
-  @doc "Whether the messages between robots are looked at."
-  @spec messages(pid(), boolean()) :: :ok
-  def messages(client, on?), do: GenServer.cast(client, {:messages, on?})
+  @doc "Whether the messages between robots, or the nodes, are looked at."
+  @spec watch(pid(), :messages | :nodes, boolean()) :: :ok
+  def watch(client, what, on?), do: GenServer.cast(client, {:watch, what, on?})
 
   @impl GenServer
   def init({connection, feed, reply}) do
@@ -40,7 +40,7 @@ defmodule Console.Page.Client do
        reply: reply,
        looked: nil,
        told: nil,
-       messages: nil
+       watched: %{}
      }}
   end
 
@@ -50,21 +50,37 @@ defmodule Console.Page.Client do
     {:noreply, %{s | looked: robot}}
   end
 
-  def handle_cast({:messages, on?}, s) do
-    if s.messages, do: Process.cancel_timer(s.messages.timer)
-    {:noreply, if(on?, do: said(s, nil), else: %{s | messages: nil})}
+  def handle_cast({:watch, what, true}, s), do: {:noreply, ask(s, what, nil)}
+
+  def handle_cast({:watch, what, false}, s),
+    do: {:noreply, %{s | watched: Map.delete(s.watched, what)}}
+
+  defp ask(s, what, told) do
+    {module, live} = {s.module, s.live}
+    %Task{ref: ref} = Task.async(fn -> {what, apply(module, what, [live])} end)
+    put_in(s.watched[what], {ref, told})
   end
 
   # Only what differs from what was told last.
-  defp said(s, told) do
-    said = s.module.messages(s.live)
-    if said != told, do: s.reply.(State.messages(said))
-    %{s | messages: %{told: said, timer: Process.send_after(self(), :messages, @messages_ms)}}
+  @impl GenServer
+  def handle_info({ref, {what, now}}, s) when is_reference(ref) do
+    Process.demonitor(ref, [:flush])
+
+    with %{^what => {^ref, told}} <- s.watched do
+      if now != told, do: s.reply.(State.watched(what, now))
+      _timer = Process.send_after(self(), {:ask, what, ref}, @watched[what])
+      {:noreply, put_in(s.watched[what], {ref, now})}
+    else
+      _asked_no_more_or_anew -> {:noreply, s}
+    end
   end
 
-  @impl GenServer
-  def handle_info(:messages, %{messages: nil} = s), do: {:noreply, s}
-  def handle_info(:messages, s), do: {:noreply, said(s, s.messages.told)}
+  def handle_info({:ask, what, ref}, s) do
+    case s.watched do
+      %{^what => {^ref, told}} -> {:noreply, ask(s, what, told)}
+      _asked_no_more_or_anew -> {:noreply, s}
+    end
+  end
 
   def handle_info(:about, %{looked: nil} = s), do: {:noreply, s}
 

@@ -39,18 +39,21 @@ defmodule Console.Page.Line do
 
   @doc """
   The order of a text, for `Console.Orders`; `{:look, robot}` for the robot that is looked at (`look mag1`, and `look` for
-  none), `{:messages, on?}` for whether those between robots are (`messages on`, `messages off`), `present` that a person sees the page. The error says in one line what is allowed.
+  none), `{:watch, what, on?}` for whether the messages between robots or the nodes are (`messages on`, `nodes off`), `present` that a person sees the page. The error says in one line what is allowed.
   """
   @spec order(String.t(), integer() | nil, [atom()], {module(), live :: term()}) ::
           {:ok, Orders.order()}
           | {:look, atom() | nil}
-          | {:messages, boolean()}
+          | {:watch, :messages | :nodes, boolean()}
           | {:error, String.t()}
   def order("look" <> name, _given_us, robots, _source),
     do: {:look, Enum.find(robots, &(Atom.to_string(&1) == String.trim(name)))}
 
   def order("messages " <> word, _given_us, _robots, _source) when word in ["on", "off"],
-    do: {:messages, word == "on"}
+    do: {:watch, :messages, word == "on"}
+
+  def order("nodes " <> word, _given_us, _robots, _source) when word in ["on", "off"],
+    do: {:watch, :nodes, word == "on"}
 
   def order("present", given_us, _robots, _source) when given_us != nil,
     do: {:ok, Orders.of_presence(given_us)}

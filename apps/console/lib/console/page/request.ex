@@ -169,7 +169,7 @@ defmodule Console.Page.Request do
     case Line.order(line, given_us, s.robots.(), s.source) do
       {:ok, order} -> Orders.give(s.orders, %{order | given_us: given_us || heard_us})
       {:look, robot} -> Client.look(s.client, robot)
-      {:messages, on?} -> Client.messages(s.client, on?)
+      {:watch, what, on?} -> Client.watch(s.client, what, on?)
       error -> reply.(State.answer(line, error))
     end
   end

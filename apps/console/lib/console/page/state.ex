@@ -111,10 +111,15 @@ defmodule Console.Page.State do
     Json.encode!(%{history | entries: entries} |> Map.put(:t, "history"))
   end
 
-  @doc "What robots have said to each other of late, or why that is not known (`c:Console.Live.messages/1`)."
-  @spec messages({:ok, [Lab.Messages.entry()]} | {:error, String.t()}) :: String.t()
-  def messages({:ok, entries}), do: Json.encode!(%{t: "messages", why: nil, entries: entries})
-  def messages({:error, line}), do: Json.encode!(%{t: "messages", why: line, entries: []})
+  @doc """
+  What robots have said to each other of late (`c:Console.Live.messages/1`), or the nodes (`c:Console.Live.nodes/1`), or why that is not known.
+
+      iex> Console.Page.State.watched(:nodes, {:error, "not here"})
+      ~S({"entries":[],"t":"nodes","why":"not here"})
+  """
+  @spec watched(:messages | :nodes, {:ok, [map()]} | {:error, String.t()}) :: String.t()
+  def watched(what, {:ok, entries}), do: Json.encode!(%{t: what, why: nil, entries: entries})
+  def watched(what, {:error, line}), do: Json.encode!(%{t: what, why: line, entries: []})
 
   defp rounded(entry) do
     stages = Enum.map(entry.stages, &stage/1)

@@ -110,7 +110,7 @@ defmodule Lab.Node.Fleet do
   defp robot(%{network: network, options: options} = fleet, id) do
     carrier = if of = options[:carrier], do: [of.(id)], else: []
     hardware? = id in Map.get(options, :hardware, [])
-    missions = Application.fetch_env!(:swarm, :missions)
+    build = Application.get_all_env(:swarm) |> Keyword.take([:missions, :companions])
 
     part = %{
       # By a name of its own: connected nodes share their directories.
@@ -129,7 +129,7 @@ defmodule Lab.Node.Fleet do
         start = start(fleet, id, if(hardware?, do: :zero, else: :on))
         profile = fleet.world.robots[id].profile
         robot = %{id: id, profile: profile, hardware?: hardware?, start: start}
-        swarm = [missions: missions, mesh: Network.mesh(network, id)]
+        swarm = [mesh: Network.mesh(network, id)] ++ build
         part = {Lab.Node.Robot, Map.put(part, :robot, robot)}
         main(fleet, vm, part, id, [swarm: swarm], apps: :permanent)
       end

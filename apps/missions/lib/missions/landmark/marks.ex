@@ -78,12 +78,10 @@ defmodule Missions.Landmark.Marks do
   defp neighbours(%{peers: peers}, _ahead) when map_size(peers) <= @nearest, do: peers
 
   defp neighbours(%{peers: peers, pose: pose}, [leader | _] = ahead) do
-    nearest =
-      peers
-      |> Enum.sort_by(fn {id, peer} -> {Pose.distance(pose, peer.pose), id} end)
-      |> Enum.map(&elem(&1, 0))
-
-    led = nearest |> Stream.filter(&(&1 in ahead)) |> Enum.take(@nearest)
+    far = for {id, peer} <- Map.to_list(peers), do: {Pose.distance(pose, peer.pose), id}
+    nearest = for {_distance, id} <- :lists.sort(far), do: id
+    ahead = Map.from_keys(ahead, [])
+    led = nearest |> Stream.filter(&is_map_key(ahead, &1)) |> Enum.take(@nearest)
     Map.take(peers, [leader | Enum.take(nearest, @nearest)] ++ led)
   end
 

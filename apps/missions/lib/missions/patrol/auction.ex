@@ -48,10 +48,19 @@ defmodule Missions.Patrol.Auction do
   def award(bids, open) do
     all = for {id, costs} <- bids, number <- open, cost = costs[number], do: {cost, id, number}
 
+    first(for {_cost, id, number} <- Enum.sort(all), do: {id, number})
+  end
+
+  @doc """
+  Of these pairs of a robot and a point, the best first, those in which neither is taken yet.
+
+      iex> Missions.Patrol.Auction.first([mag1: 0, mag2: 0, mag1: 1, mag2: 1])
+      %{mag1: 0, mag2: 1}
+  """
+  @spec first([{atom(), non_neg_integer()}]) :: %{atom() => non_neg_integer()}
+  def first(pairs) do
     {won, _sold} =
-      all
-      |> Enum.sort()
-      |> Enum.reduce({%{}, MapSet.new()}, fn {_cost, id, number}, {won, sold} ->
+      Enum.reduce(pairs, {%{}, MapSet.new()}, fn {id, number}, {won, sold} ->
         if is_map_key(won, id) or number in sold,
           do: {won, sold},
           else: {Map.put(won, id, number), MapSet.put(sold, number)}

@@ -9,7 +9,7 @@ defmodule Missions.Patrol.Options do
   | `centre:` | where its middle is | `{0.0, 0.0}` |
   | `points:` | up to 64 points instead of a loop, `[{1, 2}, {3, 4}]` | none |
   | `period:` | within which each point is to be seen | 120.0 |
-  | `by:` | how points are shared: `:motivation` (`Missions.Patrol.Motivation`), `:auction` (`Missions.Patrol.Auction`) | `:motivation` |
+  | `by:` | how points are shared: `:motivation` (`Missions.Patrol.Motivation`), `:auction` (`Missions.Patrol.Auction`), `:rules` (`Missions.Patrol.Helping`) | `:motivation` |
   """
   alias Hal.Options
 
@@ -26,7 +26,7 @@ defmodule Missions.Patrol.Options do
       centre: [@place, default: {0.0, 0.0}],
       points: [{:list, @place, @most}, default: []],
       period: [{:number, 10, 3_600, "s"}, default: 120.0],
-      by: [{:one_of, [:motivation, :auction]}, default: :motivation]
+      by: [{:one_of, [:motivation, :auction, :rules]}, default: :motivation]
     ]
   end
 

@@ -6,15 +6,16 @@ defmodule Nav.MapFile.Writer do
 
   @typedoc """
   `cells` have a byte each, rows from the lowest y: 0 unknown, 1 free, 2 wall. `left` and `low` are the numbers of the
-  lower left cell, counted from the origin of the map, `cell` is the width of a cell in metres.
+  lower left cell, counted from the origin of the map, `cell` is the width of a cell in metres. `marks` are printed marks that hang there.
   """
   @type raster :: %{
-          cells: binary(),
-          width: non_neg_integer(),
-          height: non_neg_integer(),
-          left: integer(),
-          low: integer(),
-          cell: float()
+          :cells => binary(),
+          :width => non_neg_integer(),
+          :height => non_neg_integer(),
+          :left => integer(),
+          :low => integer(),
+          :cell => float(),
+          optional(:marks) => [{id :: non_neg_integer(), {float(), float(), turn :: float()}}]
         }
 
   @doc """
@@ -27,6 +28,10 @@ defmodule Nav.MapFile.Writer do
       iex> {:ok, description} = Nav.MapFile.Description.parse(IO.iodata_to_binary(yaml))
       iex> {description.image, description.resolution, description.origin}
       {"found.pgm", 0.1, {-1.0, 0.5, 0.0}}
+      iex> {yaml, _pgm} = Nav.MapFile.Writer.encode(Map.put(map, :marks, [{7, {1.5, -2.0, 1.571}}]), "found.pgm")
+      iex> {:ok, description} = Nav.MapFile.Description.parse(IO.iodata_to_binary(yaml))
+      iex> description.marks
+      [{7, {1.5, -2.0, 1.571}}]
   """
   @spec encode(raster(), image :: String.t()) :: {yaml :: iodata(), pgm :: iodata()}
   def encode(%{width: width, height: height, cell: cell} = map, image) do
@@ -35,6 +40,7 @@ defmodule Nav.MapFile.Writer do
       ["resolution: ", metres(cell), "\n"],
       ["origin: [", metres(map.left * cell), ", ", metres(map.low * cell), ", 0.0]\n"],
       "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+      | marks(Map.get(map, :marks, []))
     ]
 
     rows =
@@ -43,6 +49,16 @@ defmodule Nav.MapFile.Writer do
       end
 
     {yaml, ["P5\n#{width} #{height}\n255\n" | rows]}
+  end
+
+  defp marks([]), do: []
+
+  defp marks(marks) do
+    lines =
+      for {id, {x, y, turn}} <- marks,
+          do: "  - [#{id}, #{metres(x)}, #{metres(y)}, #{metres(turn)}]\n"
+
+    ["marks:\n" | lines]
   end
 
   defp shade(0), do: <<205>>

@@ -78,19 +78,20 @@ defmodule Robot.Behaviour.Avoid do
 
   @impl Robot.Behaviour
   def tick(percept, state) do
-    {slow?, echoes} = Caution.check(percept, state.discs, state.echoes)
+    all = Neighbours.robots(percept)
+    {slow?, echoes} = Caution.check(percept, all, state.discs, state.echoes)
     state = %{state | slow?: slow?, echoes: echoes}
 
     if slow?,
-      do: drive(Caution.percept(percept), state, &Caution.wish/1),
-      else: drive(percept, state, & &1)
+      do: drive(Caution.percept(percept), all, state, &Caution.wish/1),
+      else: drive(percept, all, state, & &1)
   end
 
-  defp drive(percept, state, limit) do
+  defp drive(percept, all, state, limit) do
     case Robot.Behaviour.tick(state.inner, percept) do
       {:running, wish, inner} ->
         # Before, because a velocity is bent as it is; and after, because the way round something may go backwards.
-        {wish, state} = safe(limit.(wish), percept, %{state | inner: inner})
+        {wish, state} = safe(limit.(wish), percept, all, %{state | inner: inner})
         {:running, limit.(wish), {__MODULE__, state}}
 
       done ->
@@ -98,42 +99,37 @@ defmodule Robot.Behaviour.Avoid do
     end
   end
 
-  defp safe(nil, _percept, state), do: {nil, state}
-  defp safe(wish, %Percept{pose: nil}, state), do: {wish, state}
+  defp safe(nil, _percept, _all, state), do: {nil, state}
+  defp safe(wish, %Percept{pose: nil}, _all, state), do: {wish, state}
 
-  defp safe(%Wish{velocity: nil} = wish, percept, state) do
-    robots = percept |> Neighbours.robots() |> Neighbours.near()
-    {brake(wish, wish.twist, percept, robots), state}
-  end
+  defp safe(%Wish{velocity: nil} = wish, percept, all, state),
+    do: {brake(wish, wish.twist, percept, Neighbours.near(all)), state}
 
-  defp safe(wish, percept, state) do
+  defp safe(wish, percept, all, state) do
     case BackOut.note(state.out, percept) do
-      {nil, out} -> steer(wish, percept, %{state | out: out})
-      {linear, out} -> back_out(wish, linear, percept, %{state | out: out})
+      {nil, out} -> steer(wish, percept, all, %{state | out: out})
+      {linear, out} -> back_out(wish, linear, percept, all, %{state | out: out})
     end
   end
 
-  defp back_out(wish, linear, percept, state) do
-    robots = percept |> Neighbours.robots() |> Neighbours.near()
+  defp back_out(wish, linear, percept, all, state) do
     wish = %{wish | by: :back_out, goal: nil, reverse?: true, velocity: nil}
 
-    {brake(wish, Twist.new(linear, 0), percept, robots),
+    {brake(wish, Twist.new(linear, 0), percept, Neighbours.near(all)),
      %{state | progress: nil, velocity: nil, way: nil}}
   end
 
-  defp steer(%Wish{velocity: {vx, vy}} = wish, percept, state) do
+  defp steer(%Wish{velocity: {vx, vy}} = wish, percept, all, state) do
     speed = :math.sqrt(vx * vx + vy * vy)
 
     if speed < 0.02 or GiveWay.now?(state.yield, percept.at_ms),
-      do: stay(wish, percept, %{state | progress: nil, velocity: nil, way: nil}),
-      else: bend(wish, speed, percept, state)
+      do: stay(wish, percept, all, %{state | progress: nil, velocity: nil, way: nil}),
+      else: bend(wish, speed, percept, all, state)
   end
 
   # A robot that wants to stand does so, unless another cannot get past it.
-  defp stay(wish, percept, state) do
-    robots = percept |> Neighbours.robots() |> Neighbours.near()
-
-    case GiveWay.note(state.yield, robots, percept.pose, percept.at_ms) do
+  defp stay(wish, percept, all, state) do
+    case GiveWay.note(state.yield, Neighbours.near(all), percept.pose, percept.at_ms) do
       {nil, yield} ->
         {wish, %{state | yield: yield}}
 
@@ -150,13 +146,11 @@ defmodule Robot.Behaviour.Avoid do
             reverse?: true
         }
 
-        bend(wish, @aside, percept, %{state | yield: yield})
+        bend(wish, @aside, percept, all, %{state | yield: yield})
     end
   end
 
-  defp bend(wish, speed, percept, state) do
-    all = Neighbours.robots(percept)
-
+  defp bend(wish, speed, percept, all, state) do
     case right_of_way(wish, percept, all, state) do
       {{:wait, place}, state} ->
         give_way(wish, place, min(speed, @back), percept, all, state)
@@ -221,10 +215,9 @@ defmodule Robot.Behaviour.Avoid do
   defp bend_round(wish, speed, percept, all, state) do
     {all, standing} = Neighbours.steady(all, state.standing)
     robots = Neighbours.near(all)
-    bodies = Enum.map(all, fn %{at: {x, y}, radius: radius} -> {x, y, radius} end)
+    known = Neighbours.bodies(all) ++ state.discs
 
-    things =
-      percept |> Neighbours.unknown(bodies ++ state.discs) |> doubt(percept, state.progress)
+    things = percept |> Neighbours.unknown(known) |> doubt(percept, state.progress)
 
     fixed = things ++ Clearance.standing(state.discs, percept)
     way = wish.goal && Avoid.Route.round(state.way, wish.goal, percept, all, state.discs)

@@ -40,6 +40,10 @@ defmodule Swarm.Commands.Client do
   @spec given_us() :: integer()
   def given_us, do: Process.get(@given) || now_us()
 
+  @doc "The giver of the orders of this process (`Swarm.by/2`); `nil` where that was not said."
+  @spec giver() :: String.t() | nil
+  def giver, do: Process.get(@by)
+
   @doc "Whether an order of this process would be on time; the error is one line."
   @spec timely() :: :ok | {:error, line :: String.t()}
   def timely do

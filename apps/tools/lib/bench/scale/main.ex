@@ -10,7 +10,7 @@ defmodule Bench.Scale.Main do
   defp measure(given) do
     fleets = given |> Map.get("robots", [6, 20, 50]) |> Enum.sort()
     blobs = Map.get(given, "blobs", :painted)
-    seconds = Map.get(given, "seconds", 20)
+    seconds = Map.get(given, "seconds", 180)
 
     {results, about} =
       Command.loaded(fn output ->
@@ -26,7 +26,7 @@ defmodule Bench.Scale.Main do
       IO.write(Scale.draw(measured))
 
       IO.puts(
-        "\nThe first #{seconds} s of seed 1 in the hall, blobs #{blobs}, in one process. #{Load.words(about)}."
+        "\nSeed 1 in the hall, blobs #{blobs}, in one process, from the search to ten seconds after the fleet is formed, #{seconds} s at most; times real time by processor time. #{Load.words(about)}."
       )
     else
       lines -> {:error, lines}
@@ -38,7 +38,8 @@ defmodule Bench.Scale.Main do
       {"robots", "N,N", &Parse.wholes(&1, 1..1_000), "how many robots, up to 1000 (6,20,50)"},
       {"blobs", "HOW", &Parse.choice(&1, painted: :painted, direct: :direct),
        "pictures that are painted, or blobs by geometry: painted, direct (painted)"},
-      {"seconds", "S", &Parse.whole(&1, 1..10_000), "how long, in simulated seconds (20)"}
+      {"seconds", "S", &Parse.whole(&1, 1..10_000),
+       "how long at most, in simulated seconds (180)"}
     ]
   end
 end

@@ -114,6 +114,9 @@ defmodule Tools.Replay.Live do
   def messages(live), do: {:ok, GenServer.call(live, :messages, :infinity)}
 
   @impl Console.Live
+  def nodes(_live), do: {:error, "a recording says nothing of nodes and programs"}
+
+  @impl Console.Live
   def about(live, robot), do: GenServer.call(live, {:about, robot}, :infinity)
 
   @impl Console.Live

@@ -25,7 +25,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
   @driven 0.5
 
   @doc """
-  Whether it must slow down, and what it has seen; `discs` are further bodies `{x, y, radius}` that explain echoes, in the map
+  Whether it must slow down, and what it has seen; `robots` are the others (`Robot.Behaviour.Avoid.Neighbours.robots/1`), `discs` further bodies `{x, y, radius}` that explain echoes, in the map
   frame. `echoes` is what it returned at the last tick, `nil` where what stands still counts, too.
 
       iex> percept = %Robot.Percept{robot: :mag1, profile: Hal.Profile.magellan(), at_ms: 0, pose: Hal.Pose.new(0, 0)}
@@ -34,22 +34,22 @@ defmodule Robot.Behaviour.Avoid.Caution do
       iex> alone = %{percept | sonar: ahead}
       iex> one_silent = %{alone | peers: %{mag2: silent}}
       iex> stands_there = put_in(one_silent.peers.mag2.pose, Hal.Pose.new(1.4, 0))
-      iex> check = &Robot.Behaviour.Avoid.Caution.check(&1, [], &2)
+      iex> check = &Robot.Behaviour.Avoid.Caution.check(&1, Robot.Behaviour.Avoid.Neighbours.robots(&1), [], &2)
       iex> for percept <- [alone, one_silent, stands_there], do: check.(percept, nil)
       [{false, nil}, {true, nil}, {false, nil}]
       iex> {true, echoes} = check.(one_silent, %Robot.Behaviour.Avoid.Echoes{})
       iex> check.(%{one_silent | at_ms: 1_500}, echoes) |> elem(0)
       false
   """
-  @spec check(Percept.t(), [{float(), float(), float()}], Echoes.t() | nil) ::
+  @spec check(Percept.t(), [Neighbours.t()], [{float(), float(), float()}], Echoes.t() | nil) ::
           {boolean(), Echoes.t() | nil}
-  def check(%Percept{uncertainty: %{lost?: true}, peers: peers}, _discs, echoes)
+  def check(%Percept{uncertainty: %{lost?: true}, peers: peers}, _robots, _discs, echoes)
       when peers != %{},
       do: {true, echoes}
 
-  def check(%Percept{pose: nil}, _discs, echoes), do: {false, echoes}
+  def check(%Percept{pose: nil}, _robots, _discs, echoes), do: {false, echoes}
 
-  def check(%Percept{peers: peers, at_ms: at_ms} = percept, discs, echoes) do
+  def check(%Percept{peers: peers, at_ms: at_ms} = percept, robots, discs, echoes) do
     own = astray(percept)
 
     doubtful =
@@ -64,7 +64,7 @@ defmodule Robot.Behaviour.Avoid.Caution do
 
       needed? =
         percept
-        |> Neighbours.unknown(bodies(percept) ++ discs)
+        |> Neighbours.unknown(Neighbours.bodies(robots) ++ discs)
         |> Enum.any?(fn %{at: at} ->
           Enum.any?(doubtful, &within?(&1, at)) and
             not (echoes != nil and Echoes.stands?(echoes, at, at_ms))
@@ -84,9 +84,6 @@ defmodule Robot.Behaviour.Avoid.Caution do
   end
 
   defp within?({place, reach}, at), do: Pose.distance(place, at) <= reach
-
-  defp bodies(percept),
-    do: for(%{at: {x, y}, radius: radius} <- Neighbours.robots(percept), do: {x, y, radius})
 
   @doc "The percept, with the greatest speed that such a robot may have."
   @spec percept(Percept.t()) :: Percept.t()

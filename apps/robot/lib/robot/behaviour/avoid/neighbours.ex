@@ -41,6 +41,8 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   @unsure 1.0
   @heard 2.0
   @beyond 0.3
+  # Metres; what is left out by a bound is so much beyond it.
+  @rounding 1.0e-6
   # How far (metres) outside a known body an echo may be and still count as its echo.
   @explained 0.15
 
@@ -49,10 +51,12 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
   two of its sonars would hear there, and do not: it is beside where it believes to be, and avoids what it hears.
   """
   @spec robots(Percept.t()) :: [t()]
+  def robots(%Percept{pose: nil}), do: []
+
   def robots(%Percept{pose: pose} = percept) do
     # `keysort` keeps the order of what is equally near.
     discs = for {id, peer} <- Map.to_list(percept.peers), do: disc(id, peer, pose, percept)
-    discs = if unsure?(percept), do: Enum.reject(discs, &unheard?(&1, percept)), else: discs
+    discs = if unsure?(percept), do: heard(discs, percept), else: discs
     for {_gap, disc} <- :lists.keysort(1, Enum.map(discs, &{&1.gap, &1})), do: disc
   end
 
@@ -61,11 +65,24 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
 
   # One sonar may fail, or miss an echo: two must hear nothing up to well behind its front. A round body sends the echo back
   # along the line to its middle, so only those count that look at that.
-  defp unheard?(%{at: at, radius: radius}, %{pose: pose, profile: profile, sonar: ranges}) do
-    echoes =
+  defp heard(discs, %{pose: pose, profile: profile, sonar: ranges}) do
+    ears =
       for {mount, range} <- Enum.zip(profile.sonars, ranges),
           is_number(range),
-          from = Pose.compose(pose, mount),
+          do: {Pose.compose(pose, mount), range}
+
+    # From there no sonar hears a robot.
+    far = for({ear, _range} <- ears, do: Pose.distance(ear, pose)) |> Enum.max(fn -> 0.0 end)
+    far = @heard + far + @rounding
+
+    Enum.reject(discs, fn disc ->
+      Pose.distance(pose, disc.at) < far and unheard?(disc, ears, profile)
+    end)
+  end
+
+  defp unheard?(%{at: at, radius: radius}, ears, profile) do
+    echoes =
+      for {from, range} <- ears,
           distance = Pose.distance(from, at),
           distance < @heard and distance > radius,
           abs(Pose.bearing(from, at)) < profile.sonar_cone / 2,
@@ -102,6 +119,10 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
       do: at,
       else: {mx + @recent * (x - mx), my + @recent * (y - my)}
   end
+
+  @doc "Their bodies, as further discs are given."
+  @spec bodies([t()]) :: [{float(), float(), float()}]
+  def bodies(robots), do: for(%{at: {x, y}, radius: radius} <- robots, do: {x, y, radius})
 
   @doc "The nearest of these robots, at most ten, within 4 m."
   @spec near([t()]) :: [t()]
@@ -142,20 +163,34 @@ defmodule Robot.Behaviour.Avoid.Neighbours do
         &if(is_number(&1) and &1 < @sonar_range, do: &1, else: profile.sonar_max)
       )
 
-    for point <- Reflex.Body.points(profile, near),
-        {x, y} = Pose.place(pose, point),
-        not Enum.any?(known, &explains?(&1, x, y)) do
+    points = for point <- Reflex.Body.points(profile, near), do: Pose.place(pose, point)
+    known = within(known, pose, points)
+
+    for {x, y} = place <- points, not Enum.any?(known, &explains?(&1, x, y)) do
       %{
         id: nil,
-        at: {x, y},
+        at: place,
         velocity: {0.0, 0.0},
         radius: @sonar_radius,
         share: 1.0,
         standing?: true,
         fixed?: true,
-        gap: Pose.distance(pose, {x, y}) - @sonar_radius - profile.radius
+        gap: Pose.distance(pose, place) - @sonar_radius - profile.radius
       }
     end
+  end
+
+  # Those that may explain one of these points.
+  defp within(_known, _pose, []), do: []
+
+  defp within(known, pose, points) do
+    far = for(point <- points, do: Pose.distance(pose, point)) |> Enum.max()
+    far = far + @explained + @rounding
+
+    Enum.filter(known, fn {x, y, radius} ->
+      {dx, dy, reach} = {x - pose.x, y - pose.y, far + radius}
+      dx * dx + dy * dy < reach * reach
+    end)
   end
 
   @doc """
