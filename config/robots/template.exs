@@ -82,9 +82,9 @@
   colours: "landmark.txt",
 
   # The printed marks that the camera looks for (mix mark): [family: :tag36h11, size: 0.16], or nil for none; those of the
-  # family :similar need no library. The size is the side of the square between the corners, in metres.
-  # known: [{7, {2.0, 1.5, deg(90)}}] says where some hang and face that the map does not name, robots: [{11, :mag2}] which
-  # robots bear them on their backs.
+  # family :similar need no library. The size is the side of the square between the corners, in metres. Where some hang and
+  # face that the map does not name, known: [{7, {2.0, 1.5, deg(90)}}] says, and robots: [{11, :mag2}]
+  # says which robots bear them on their backs.
   marks: nil,
 
   # Keeps pictures of the camera as JPEG, so many a second, the newest of them, in a folder that is there:
