@@ -44,7 +44,7 @@ defmodule Vision.Marks.Similar.Pattern do
       4
   """
   @spec code(0..15) :: [0..1, ...]
-  def code(id) when id in 0..(@codes - 1) do
+  def code(id) when id in 0..(@codes - 1)//1 do
     [a, b, c, d] = for shift <- 3..0//-1, do: id >>> shift &&& 1
     word = [bxor(bxor(a, b), d), bxor(bxor(a, c), d), a, bxor(bxor(b, c), d), b, c]
     word ++ [1 - d, 1 - rem(Enum.sum(word) + d, 2)]
@@ -66,7 +66,7 @@ defmodule Vision.Marks.Similar.Pattern do
 
   @doc "The picture of a mark; `nil` if there is no such id."
   @spec picture(non_neg_integer()) :: Picture.t() | nil
-  def picture(id) when id in 0..(@codes - 1) do
+  def picture(id) when id in 0..(@codes - 1)//1 do
     stripes = Enum.reverse(@edges)
     edges = [-0.1] ++ stripes ++ for(k <- 11..21, do: k / 10)
     black = [0] ++ for(k <- 10..0//-1, do: 1 - rem(k, 2)) ++ [0, 1] ++ code(id) ++ [0]
