@@ -13,7 +13,7 @@ defmodule Console.Prompt do
   alias Swarm.{BehaviourRegistry, MissionRegistry}
 
   @object ~r/\A(ball|box)\d{1,4}\z/
-  @words ~w(kill formation landmark move place goto follow drive gamepad stop estop reset start run replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
+  @words ~w(kill formation landmark move place goto follow drive gamepad stop estop reset start run send replace arm disarm acknowledge keep pause resume step speed status nodes page tell help quit)
 
   # Linux's name of the first gamepad.
   @gamepad "/dev/input/js0"
@@ -148,6 +148,7 @@ defmodule Console.Prompt do
       ["start"] -> MissionRegistry.names() ++ names
       ["start", name] -> if name in names, do: MissionRegistry.names(), else: []
       ["run"] -> names
+      ["send"] -> ["all" | names]
       ["run", name] -> if name in names, do: BehaviourRegistry.names(), else: []
       ["replace"] -> MissionRegistry.names() ++ ["all" | names]
       ["replace", name] -> if name in ["all" | names], do: MissionRegistry.names(), else: []
@@ -190,6 +191,7 @@ defmodule Console.Prompt do
         "replace mag2 patrol           what ends in 10 s goes back (not in lockstep)",
         "mag2 wander, rest, square:2   one robot roams, rests, drives a square",
         "run mag2 NAME                 one robot runs a behaviour of your own",
+        "send mag2 leg:leg=3           a message to its mission; send all … to each",
         "estop, or F8; reset           emergency stop of all, until the reset",
         "keep, keep mag2               their last minute is written as a recording",
         "mag2 move:0.2:0.1, all stop   any text command to one robot, or to all"
@@ -295,6 +297,12 @@ defmodule Console.Prompt do
 
   defp command("run", _rest, _robots),
     do: {:error, "run needs a name and a behaviour: run mag1 #{behaviour()}"}
+
+  defp command("send", [name | [_ | _] = message], robots),
+    do: tell(name, ["send", Enum.join(message, " ")], robots)
+
+  defp command("send", _rest, _robots),
+    do: {:error, "send needs a name, or all, and a message: send mag1 KIND:FIELD=VALUE"}
 
   defp command("replace", [mission], robots), do: replace("all", mission, robots)
   defp command("replace", [who, mission], robots), do: replace(who, mission, robots)
