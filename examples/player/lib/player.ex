@@ -22,6 +22,7 @@ defmodule Player do
     CameraOptions,
     Defaults,
     Parts,
+    Robots,
     RFlexOptions,
     Sections,
     State,
@@ -64,19 +65,21 @@ defmodule Player do
     * `:colours` - `function.(name)` gives `{path, {:ok, colours} | {:error, line}}`: the path of
       the colour file for the robot file, and what is in it
 
-  The error is one line. It names what keeps the file from being read, or says that it has no
-  rFLEX driver, or which of its lines leaves open where the robot's sensors are
-  (`Player.Boards.sure/1`).
+  The error is one line, with the line of the file. It names what keeps the file from being read, or says why there is no robot in
+  it (`Player.Unsupported.robotless/1`), or which of its lines leaves open where the robot's sensors are (`Player.Boards.sure/1`).
+
+  A file that has several robots, at ports of their own, is read for the first of them (`Player.Robots`).
   """
   @spec import(String.t(), keyword()) :: {:ok, result()} | {:error, String.t()}
   def import(text, options \\ []) do
     file = Keyword.get(options, :file, "configuration file")
 
     with {:ok, parsed} <- Sections.parse(text),
-         sections = Parts.join(parsed.sections),
+         :ok <- based(parsed),
+         {sections, left, assumed} = Robots.one(Parts.join(parsed.sections), &kind/1),
          units = Units.context(parsed.options, sections, options[:version]),
-         state = Enum.reduce(sections, start(parsed), &section(&1, &2, units)),
-         :ok <- based(state),
+         state = start(parsed, left, assumed),
+         state = Enum.reduce(sections, state, &section(&1, &2, units)),
          # The fault of a line itself is reported before the faults that follow from it.
          :ok <- Boards.sure(state),
          {profile, state} = finish(state, options),
@@ -84,30 +87,34 @@ defmodule Player do
       {:ok, result(state, profile, file, options)}
     else
       {:error, {line, why}} -> {:error, "#{file}:#{line}: #{why}"}
-      {:error, why} -> {:error, "#{file}: #{why}"}
     end
   end
 
-  defp start(parsed) do
-    left =
-      for({line, name} <- parsed.includes) do
+  defp start(parsed, left, assumed) do
+    included =
+      for {line, name} <- parsed.includes do
         {line, "include \"#{name}\"",
          "other files are not read: import that file, or copy its text"}
-      end ++
-        for {name, line, _value} <- parsed.options, name not in ~w(unit_length unit_angle) do
-          {line, name, "says nothing about the robot"}
-        end
+      end
 
-    %{values: [], assumed: [], left: left, seen: []}
+    global =
+      for {name, line, _value} <- parsed.options, name not in ~w(unit_length unit_angle) do
+        {line, name, "says nothing about the robot"}
+      end
+
+    %{values: [], assumed: assumed, left: included ++ global ++ left, seen: []}
   end
 
-  # Older files have position:0 ( driver "rflex" … ), newer ones driver ( name "rflex" … ).
+  # What a section's driver is here, or `nil`.
+  defp kind(section) do
+    name = Sections.driver(section)
+    if name in Parts.names(), do: :drive, else: Map.get(@drivers, name)
+  end
+
   defp section(section, state, units) do
-    name = text_of(section, "name") || text_of(section, "driver")
+    name = Sections.driver(section)
 
-    kind = if name in Parts.names(), do: :drive, else: Map.get(@drivers, name)
-
-    case {section.type, kind} do
+    case {section.type, kind(section)} do
       {"driver", nil} ->
         left(state, section.line, "driver #{name}", Unsupported.driver(name, names()))
 
@@ -121,13 +128,6 @@ defmodule Player do
 
   # The plain names first: of two that are equally near, these are suggested.
   defp names, do: @drivers |> Map.keys() |> Enum.sort()
-
-  defp text_of(section, name) do
-    case List.keyfind(section.options, name, 0) do
-      {_name, _line, text} when is_binary(text) -> text
-      _none -> nil
-    end
-  end
 
   defp left(state, line, what, why), do: %{state | left: [{line, what, why} | state.left]}
 
@@ -143,19 +143,20 @@ defmodule Player do
       options = Enum.reject(section.options, fn {name, _line, _value} -> name in @said end)
 
       {options, again} = once(options)
-
-      left = for {name, line, _value} <- again, do: {line, name, "occurs twice; the first counts"}
+      left = for {name, line, _value} <- again, do: {line, name, "occurs twice; the last counts"}
 
       Enum.reduce(options, %{state | left: left ++ inner ++ state.left}, fn {name, line, value},
                                                                             state ->
-        carry(state, {line, name}, carried(kind, name, value, units, section.options))
+        carry(state, {line, name}, carried(kind, name, value, units, options))
       end)
     end
   end
 
+  # Player writes what comes later over what was there. The remark is at the line of the last, which counts.
   defp once(options) do
-    first = Enum.uniq_by(options, &elem(&1, 0))
-    {first, options -- first}
+    last = options |> Enum.reverse() |> Enum.uniq_by(&elem(&1, 0)) |> Enum.reverse()
+    names = Enum.frequencies_by(options, &elem(&1, 0))
+    {last, Enum.filter(last, fn {name, _line, _value} -> names[name] > 1 end)}
   end
 
   defp carried(kind, name, value, units, others) do
@@ -181,18 +182,10 @@ defmodule Player do
   defp carry(state, {line, name}, {:left, why}),
     do: left(state, line, name, why)
 
-  defp based(state) do
-    cond do
-      :drive in state.seen ->
-        :ok
-
-      state.left == [] ->
-        {:error, "it has no driver"}
-
-      true ->
-        {:error,
-         "it has no driver \"rflex\", so it is neither for a Magellan Pro nor for an ATRV mini"}
-    end
+  defp based(parsed) do
+    if Enum.any?(parsed.sections, &(kind(&1) == :drive)),
+      do: :ok,
+      else: {:error, Unsupported.robotless(parsed)}
   end
 
   defp finish(state, options) do

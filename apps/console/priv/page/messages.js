@@ -1,4 +1,5 @@
-// What robots say to each other, as a grid: the newest last, what is said again in one row with its count.
+// What robots say to each other, as a grid: the newest last, what is said again in one row with its count. Below it a person
+// writes to their missions.
 import { by, made, write } from "./dom.js";
 import { Watched } from "./watched.js";
 
@@ -9,11 +10,73 @@ export function told(entries, at_s, chosen) {
 }
 
 export class Messages extends Watched {
-  at_s = Infinity;
-  chosen = null;
+  constructor(ask) {
+    super(ask);
+    this.at_s = Infinity;
+    this.chosen = null;
+    this.hears = []; // of each mission that hears people: {mission, kinds: [{kind, fields: [{name, allowed}]}]}
+    this.kinds = [];
+    by("write-kind").onchange = () => this.fields();
+  }
+
+  writable(hears) {
+    this.hears = hears;
+    this.offer(null);
+  }
+
+  // The kinds of the mission in force, or of all where that is not known here.
+  offer(mission) {
+    const known = this.hears.filter((h) => h.mission === mission?.split(":")[0]);
+    const of = mission && !known.length ? [] : mission ? known : this.hears;
+    this.kinds = of.flatMap((h) => h.kinds);
+    this.mission = mission;
+    const barred = this.kinds.length === 0;
+    for (const e of by("write").querySelectorAll("label, button, span")) e.hidden = barred;
+    const which = this.hears.map((h) => h.mission).join(", ");
+    const why = which ? `${mission} hears no messages of people; these do: ${which}.` : "No mission here hears messages of people.";
+    write(by("write-note"), barred ? why : "");
+    by("write-kind").replaceChildren(...this.kinds.map(({ kind }) => new Option(kind)));
+    this.fields();
+  }
+
+  // A field for each that the message has, with what is allowed in it.
+  fields() {
+    const kind = this.kinds[by("write-kind").selectedIndex];
+    const field = ({ name, allowed }) => {
+      const label = made("label", name);
+      label.append(made("input", "", { name, placeholder: allowed, title: allowed, spellcheck: false, maxLength: 300 }));
+      return label;
+    };
+    by("write-fields").replaceChildren(...(kind?.fields ?? []).map(field));
+  }
+
+  // The line of what was written.
+  written() {
+    write(by("write-answer"), "");
+    const fields = [...by("write-fields").querySelectorAll("input")].filter((i) => i.value.trim());
+    const said = fields.map((i) => `${i.name}=${i.value.trim()}`).join(",");
+    return `send ${by("write-to").value} ${by("write-kind").value}${said && ":"}${said}`;
+  }
+
+  answered(text, ok) {
+    write(by("write-answer"), text);
+    by("write-answer").className = ok ? "good" : "bad";
+  }
+
+  // Who may be written to: all, and the robots that live; at first the chosen one.
+  addressees(robots, chosen) {
+    const to = by("write-to");
+    const names = ["all", ...robots.filter((r) => r.alive).map((r) => r.id)];
+    const was = chosen === this.chosen ? to.value : (chosen ?? "all");
+    if (names.join() !== [...to.options].map((o) => o.value).join()) to.replaceChildren(...names.map((name) => new Option(name)));
+    const value = names.includes(was) ? was : "all";
+    if (to.value !== value) to.value = value;
+  }
 
   // Another robot, or another time.
-  show({ at_s }, chosen) {
+  show({ at_s, mission, robots }, chosen) {
+    if ((mission ?? null) !== this.mission) this.offer(mission ?? null);
+    this.addressees(robots, chosen);
     const later = (than) => this.entries.at(-1)?.at_s > than;
     const same = chosen === this.chosen && !later(at_s) && !later(this.at_s);
     [this.at_s, this.chosen] = [at_s, chosen];

@@ -122,6 +122,7 @@ function hear(message) {
     for (const e of all("[data-offer]")) e.hidden = !message.offers.includes(e.dataset.offer);
     by("off").hidden = !message.width;
     const same = by("mission").options[0];
+    messages.writable(message.hears);
     by("mission").replaceChildren(same, ...message.missions.map((name) => new Option(name)));
     const replay = message.offers.includes("replay");
     document.body.classList.toggle("replay", replay);
@@ -148,6 +149,7 @@ function answer({ ok, text, line }) {
   output.textContent = text;
   output.className = ok ? "good" : "bad";
   if (line) given.answer(line, text, ok);
+  if (line?.startsWith("send ")) messages.answered(text, ok);
   if (!ok) floor.ghost = null;
   by("toast").classList.remove("gone");
   clearTimeout(closing);
@@ -320,6 +322,8 @@ by("command").onsubmit = (e) => {
   if (line.value.trim()) say(line.value.trim());
   line.value = "";
 };
+
+by("write").onsubmit = (e) => (e.preventDefault(), say(messages.written()));
 
 follows("mission", "shape", "spacing", "speed");
 reasons();

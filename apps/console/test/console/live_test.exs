@@ -65,6 +65,72 @@ defmodule Console.LiveTest do
     assert tell.(:all, "start") == {:ok, "accepted"}
   end
 
+  test "a person writes to the robots' mission: what its table allows, of a kind that it hears from people" do
+    line = "--robots 2 --mission flock:course=[{0,0},{3,0},{6,0}] --landmark none --seed 3"
+    options = Options.trial(Runs.options(line))
+    {:ok, live} = Live.Trial.start_link(Lab.Trial, options, Console.Pace.new(:max))
+    assert {:ok, _paused} = Live.Trial.command(live, {:pace, :pause})
+
+    tell = fn text ->
+      with {:ok, command} <- Console.Prompt.parse(text, [:mag1, :min1]),
+           do: Live.Trial.command(live, command)
+    end
+
+    for {text, line} <- [
+          {"send mag1 leg:leg=99",
+           "mag1: message leg option leg: expected a whole number from 1 to 65, got 99"},
+          {"send mag1 leg:leg=far",
+           "mag1: message leg option leg: expected a whole number from 1 to 65, got :far"},
+          {"send mag1 leg", "mag1: message leg option leg is missing"},
+          {"mag1 send:leg:leg=2,pace=3", "mag1: message leg option pace is not known"},
+          {"send mag1 leg:2", ~s(mag1: leg: expected KEY=VALUE,…, got "2")},
+          {"send mag1 leg:leg=" <> String.duplicate("é", 200),
+           "mag1: message leg option leg: expected"},
+          {"send mag1 lag:leg=2",
+           ~s(mag1: flock hears of people leg, not "lag"; did you mean leg?)},
+          # What robots tell each other is no person's to say.
+          {"send mag1 member:plan=1,leg=2", ~s(mag1: flock hears of people leg, not "member")},
+          {"send mag9 leg:leg=2", ~s(no robot "mag9")},
+          {"send mag1", "send needs a name, or all, and a message"},
+          {"mag1 send", "send: kind is missing: expected send:KIND or send:KIND:FIELDS"}
+        ] do
+      assert {:error, told} = tell.(text)
+      assert String.starts_with?(told, line), told
+    end
+
+    refute Enum.any?(said(live), &(&1.from == "a person"))
+    assert tell.("send mag1 leg:leg=2") == {:ok, "accepted"}
+
+    assert [%{to: [:mag1], text: "leg:leg=2", count: 1}] =
+             for(%{from: "a person"} = row <- said(live), do: row)
+
+    # The answer: it tells the others, and they tell it on.
+    assert {:ok, _steps} = Live.Trial.command(live, {:pace, {:step, 5}})
+
+    passed_on(live, [:mag1, :min1])
+
+    # As all other orders.
+    assert tell.("estop") == {:ok, "accepted"}
+    assert {:error, line} = tell.("send all leg:leg=3")
+    assert line =~ "mag1 is held by the emergency stop; reset it first"
+    assert tell.("reset") == {:ok, "accepted"}
+    assert {:error, line} = tell.("send mag1 leg:leg=3")
+    assert line == "mag1: it has no mission that could hear a message; start it first"
+    assert tell.("start patrol") == {:ok, "accepted"}
+    assert tell.("send mag1 leg:leg=3") == {:error, "mag1: patrol hears no messages of people"}
+  end
+
+  # Returns once these robots have told the others of leg 2.
+  defp passed_on(live, robots) do
+    told = for %{from: id, text: "member" <> rest} <- said(live), rest =~ "leg 2", do: id
+    if robots -- told != [], do: passed_on(live, robots)
+  end
+
+  defp said(live) do
+    {:ok, rows} = Live.Trial.messages(live)
+    rows
+  end
+
   # What a run shows once it has paused by itself, or is ahead.
   defp until(live, shows?) do
     pace = Live.Trial.pace(live)

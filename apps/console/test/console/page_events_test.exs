@@ -89,6 +89,82 @@ defmodule Console.PageEventsTest do
     Browser.close(browser)
   end
 
+  # What a person fills in, and sends by the button.
+  defp send_message(browser, fields) do
+    for {selector, value} <- fields do
+      Browser.run(browser, """
+      const e = document.querySelector("#{selector}");
+      e.value = #{inspect(value)};
+      e.dispatchEvent(new Event("change"));
+      """)
+    end
+
+    click(browser, "#write button")
+  end
+
+  defp written(browser),
+    do: Browser.run(browser, "return document.getElementById('write-answer').innerText")
+
+  test "a person writes a message by the fields of its table, to a robot or to all, and reads the answer",
+       %{
+         browser: browser,
+         live: live
+       } do
+    FakeLive.change(live, &%{&1 | mission: "flock"})
+    click(browser, "#tab-messages")
+    Browser.await(browser, "return document.querySelectorAll('#write-fields input').length === 1")
+
+    assert Browser.run(browser, "return document.querySelector('#write-fields').innerText") ==
+             "leg"
+
+    field = "return document.querySelector('#write-fields input').placeholder"
+    assert Browser.run(browser, field) == "a whole number from 1 to 65"
+    options = "return [...document.querySelectorAll('#write-to option')].map((o) => o.value)"
+    assert Browser.run(browser, options) == ["all", "mag1", "min1"]
+
+    send_message(browser, [{"#write-to", "min1"}, {"#write-fields input", " 3 "}])
+    Browser.await(browser, "return document.getElementById('write-answer').innerText !== ''")
+    assert written(browser) == "send min1 leg:leg=3: accepted"
+    assert FakeLive.told(live) == [{:tell, [:min1], {:send, "leg:leg=3"}}]
+
+    send_message(browser, [{"#write-to", "all"}, {"#write-fields input", ""}])
+
+    Browser.await(
+      browser,
+      "return document.getElementById('write-answer').innerText.includes('all')"
+    )
+
+    assert List.last(FakeLive.told(live)) == {:tell, :all, {:send, "leg"}}
+
+    # In the list of orders, as all others.
+    assert [["send all leg" | _], ["send min1 leg:leg=3" | _]] =
+             for([_time | row] <- Enum.sort(rows(browser, "given")), do: row) |> Enum.sort()
+
+    # What the robots refuse stands there in one line; what is typed stays.
+    FakeLive.refuse(
+      live,
+      "min1: message leg option leg: expected a whole number from 1 to 65, got 99"
+    )
+
+    send_message(browser, [{"#write-fields input", "99"}])
+    Browser.await(browser, "return document.getElementById('write-answer').className === 'bad'")
+    assert written(browser) =~ "min1: message leg option leg: expected a whole number"
+
+    assert Browser.run(browser, "return document.querySelector('#write-fields input').value") ==
+             "99"
+
+    # Of one that is chosen it is written to first; a mission without such messages says so.
+    click(browser, "[data-id=mag1] button")
+    Browser.await(browser, "return document.getElementById('write-to').value === 'mag1'")
+    FakeLive.change(live, &%{&1 | mission: "patrol"})
+    click(browser, "#tab-messages")
+    Browser.await(browser, "return !document.querySelector('#write button').checkVisibility()")
+    note = Browser.run(browser, "return document.getElementById('write-note').textContent")
+    assert note == "patrol hears no messages of people; these do: flock."
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+
   test "a row says when, what and in words; a click chooses the robot, and the moment where there is a time line",
        %{
          browser: browser,

@@ -59,9 +59,14 @@ defmodule Console.FakeLive do
 
   @impl Console.Live
   def command(live, command) do
-    Agent.update(live, &%{&1 | told: [command | &1.told]})
-    {:ok, "accepted"}
+    Agent.get_and_update(
+      live,
+      &{Map.get(&1, :answer, {:ok, "accepted"}), %{&1 | told: [command | &1.told]}}
+    )
   end
+
+  @doc "From now on it refuses what it is told, in these words."
+  def refuse(live, line), do: Agent.update(live, &Map.put(&1, :answer, {:error, line}))
 
   @impl Console.Live
   def messages(live), do: Agent.get(live, &Map.get(&1, :messages, {:ok, []}))

@@ -103,6 +103,10 @@ defmodule Lab.Fleet do
   @spec messages(GenServer.server()) :: {:ok, [Messages.entry()]} | {:error, line :: String.t()}
   def messages(fleet), do: GenServer.call(fleet, :messages, :infinity)
 
+  @doc "Adds to that what a person wrote to robots, and they took."
+  @spec written(GenServer.server(), :all | [atom()], String.t()) :: :ok
+  def written(fleet, to, text), do: GenServer.cast(fleet, {:written, to, text})
+
   @doc "The robots that live, in the order of the fleet."
   @spec living(GenServer.server()) :: [atom()]
   def living(fleet), do: GenServer.call(fleet, :living)
@@ -225,6 +229,10 @@ defmodule Lab.Fleet do
       error -> {:reply, error, s}
     end
   end
+
+  @impl GenServer
+  def handle_cast({:written, to, text}, s),
+    do: {:noreply, %{s | messages: Messages.person(s.messages, now(s), to, text)}}
 
   @impl GenServer
   def handle_info(:tick, %{ended: {_line, _at_ms}} = s), do: {:noreply, s}

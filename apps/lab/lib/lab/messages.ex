@@ -23,7 +23,7 @@ defmodule Lab.Messages do
           at_s: float(),
           last_s: float(),
           count: pos_integer(),
-          from: atom(),
+          from: atom() | (person :: String.t()),
           to: :all | [atom()],
           kind: Message.kind(),
           text: String.t()
@@ -44,6 +44,17 @@ defmodule Lab.Messages do
         else: messages
     end)
   end
+
+  @doc """
+  The same with what a person wrote to these robots at this time (`Swarm.MissionRegistry.Text.message/2`).
+
+      iex> [row] = %Lab.Messages{} |> Lab.Messages.person(1_500, [:mag1], "leg:leg=3") |> Lab.Messages.list()
+      iex> {row.from, row.to, row.text}
+      {"a person", [:mag1], "leg:leg=3"}
+  """
+  @spec person(t(), at_ms :: integer(), :all | [atom()], String.t()) :: t()
+  def person(%__MODULE__{} = messages, at_ms, to, text),
+    do: add(messages, at_ms / 1000, {"a person", addressees(to), :mission, text})
 
   defp addressees(:all), do: :all
   defp addressees(robots), do: List.wrap(robots)

@@ -103,7 +103,7 @@ defmodule Missions.Flock do
   defdelegate option_table, to: Options, as: :table
 
   @impl Robot.Mission
-  def commands, do: []
+  def commands, do: [:leg]
 
   @impl Robot.Mission
   def messages do
@@ -111,7 +111,8 @@ defmodule Missions.Flock do
      member: [
        plan: [{:integer, 0, 0xFFFFFFF}, required: true],
        leg: [{:integer, 0, Options.most() + 1}, required: true]
-     ]}
+     ],
+     leg: [leg: [{:integer, 1, Options.most() + 1}, required: true]]}
   end
 
   @impl Robot.Mission
@@ -150,6 +151,10 @@ defmodule Missions.Flock do
       when now_ms != nil,
       do: result(hear(mission, from, Map.new(body)), [])
 
+  # A person has it go on; the others hear it by the next `member`.
+  def handle({:command, {:message, :leg, [leg: leg]}}, mission),
+    do: result(go_on(mission, leg), [])
+
   # What stood in its way may be gone; it tries again.
   def handle({:outcome, {:way, go}, _outcome}, %{go: go} = mission),
     do: result(%{mission | go: go + 1}, [])
@@ -184,11 +189,14 @@ defmodule Missions.Flock do
 
   # Another course is another flock.
   defp hear(%{plan: plan} = mission, from, %{plan: plan, leg: leg}) do
-    mission = %{mission | heard: Members.hear(mission.heard, from, mission.now_ms)}
-    if leg > mission.leg and leg <= last(mission), do: on_leg(mission, leg), else: mission
+    go_on(%{mission | heard: Members.hear(mission.heard, from, mission.now_ms)}, leg)
   end
 
   defp hear(mission, _from, _of_others), do: mission
+
+  # No leg comes twice.
+  defp go_on(mission, leg),
+    do: if(leg > mission.leg and leg <= last(mission), do: on_leg(mission, leg), else: mission)
 
   defp last(mission), do: map_size(mission.course) + 1
   defp there?(mission), do: mission.leg == last(mission) and mission.together?

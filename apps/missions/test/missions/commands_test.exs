@@ -118,6 +118,28 @@ defmodule Swarm.CommandsTest do
     assert order(fn -> Swarm.follow(c, a) end) == :ok
   end
 
+  test "a person writes to the mission that a robot runs; its table says what is wrong, and the e-stop holds it as an order" do
+    id = robot(:command_flock)
+    standing([id])
+    line = line(Swarm.tell(id, "send:leg:leg=2"))
+    assert line == "command_flock: it has no mission that could hear a message; start it first"
+
+    assert order(fn -> Swarm.start(:flock, robots: [id], course: [{0, 0}, {9, 0}]) end) == :ok
+    eventually(fn -> match?({Missions.Flock, phase} when phase != :idle, state(id)) end)
+    assert order(fn -> Swarm.tell(id, "send:leg:leg=2") end) == :ok
+    assert mission(id).leg == 2
+    assert {Missions.Flock, :flock} = state(id)
+
+    assert line(Swarm.tell(id, {:send, "leg:leg=0"})) ==
+             "command_flock: message leg option leg: expected a whole number from 1 to 65, got 0"
+
+    assert line(Swarm.tell(id, "send:member:leg=3")) =~ "flock hears of people leg"
+    assert line(Swarm.tell(id, {:send, <<255>>})) =~ "not text"
+    assert order(fn -> Swarm.estop() end) == :ok
+    assert line(Swarm.tell(id, "send:leg:leg=3")) =~ "is held by the emergency stop"
+    assert order(fn -> Swarm.reset() end) == :ok
+  end
+
   test "the mission starts, takes a formation, stops, and a robot that is sent elsewhere leaves it" do
     id = robot(:command_group)
     assert line(Swarm.formation(:wedge)) =~ "start it first"

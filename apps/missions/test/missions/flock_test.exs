@@ -116,6 +116,23 @@ defmodule Missions.FlockTest do
     refute pulled?.(hear(runner, :mag2, letter(spacing: 2)), beside.(:moving))
   end
 
+  test "a person has it go on to a leg, and it tells the others at once; no robot can say so, and no leg comes twice" do
+    options = [course: [{0, 0}, {4, 0}, {8, 0}]]
+    {runner, _effects} = tick(flock(options), 0)
+    said = &{:command, {:message, :leg, [leg: &1]}}
+    {on, []} = Runner.handle(runner, said.(2))
+    assert on.mission.leg == 2
+    {_on, effects} = tick(on, 100)
+    assert {:send, :all, %Letter{kind: :member, fields: fields}} = List.keyfind(effects, :send, 0)
+    assert fields[:leg] == 2
+
+    for leg <- [1, 2, 5], do: assert({%{mission: %{leg: 2}}, []} = Runner.handle(on, said.(leg)))
+    assert {%{mission: %{leg: 4}}, []} = Runner.handle(on, said.(4))
+
+    forged = Letter.new!(Flock, :all, :leg, leg: 3)
+    assert hear(on, :mag2, forged).mission == on.mission
+  end
+
   test "the greatest leg that anybody tells counts, one beyond the course does not, and junk is refused" do
     options = [course: [{0, 0}, {4, 0}]]
     {runner, _effects} = tick(flock(options), 0)

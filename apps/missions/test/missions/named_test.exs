@@ -116,8 +116,19 @@ defmodule Missions.NamedTest do
     end
 
     Enum.each(texts.(), refuse)
+
+    messages = fn ->
+      ["#{junk.()}:leg=2", "leg:#{junk.()}=2", "leg:leg=:#{junk.()}", "leg:leg=#{junk.()}"]
+    end
+
+    unsaid = fn text ->
+      assert {:error, _line} = Text.message({:ok, %{state: {Missions.Flock, :flock}}, 0}, text)
+    end
+
+    Enum.each(messages.(), unsaid)
     before = :erlang.system_info(:atom_count)
     for _ <- 1..50, do: Enum.each(texts.(), refuse)
+    for _ <- 1..50, do: Enum.each(messages.(), unsaid)
     assert :erlang.system_info(:atom_count) == before
   end
 end

@@ -15,6 +15,7 @@ defmodule Robot.Command do
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
   | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
   | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.BehaviourRegistry`) |
+  | `send:KIND` or `send:KIND:FIELDS` | `{:send, text}`, a message to the running mission, of a kind that it hears from people, and its fields in words (`Swarm.MissionRegistry.Text`) |
   | `lead`, `start`, `ping`, `keep` | `:lead`, `:start`, `:ping`, `:keep` |
   | `start:MISSION` or `start:MISSION:OPTIONS` | `{:start, text}`, a mission and its options in words (`Swarm.MissionRegistry.Text`) |
   | `arm`, `disarm`, `acknowledge` | `:arm`, `:disarm`, `:acknowledge` (`Hal.Device.Arming`) |
@@ -32,6 +33,7 @@ defmodule Robot.Command do
           | {:start, mission :: String.t()}
           | {:run, behaviour :: String.t()}
           | {:run, module(), options :: keyword()}
+          | {:send, message :: String.t()}
           | :wander
           | :rest
           | {:square, side :: float() | nil}
@@ -68,6 +70,7 @@ defmodule Robot.Command do
     {"rest", [], []},
     {"square", [], [:side]},
     {"run", [:behaviour], [:options]},
+    {"send", [:kind], [:fields]},
     {"start", [], [:mission, :options]},
     {"ping", [], []},
     {"keep", [], []},
@@ -122,7 +125,7 @@ defmodule Robot.Command do
   defp command([word | arguments], known) do
     keyword = word |> String.trim() |> String.downcase()
     # Options in words may hold colons, too.
-    arguments = if keyword in ["start", "run"], do: joined(arguments), else: arguments
+    arguments = if keyword in ["start", "run", "send"], do: joined(arguments), else: arguments
 
     case List.keyfind(@grammar, keyword, 0) do
       nil ->
@@ -179,6 +182,7 @@ defmodule Robot.Command do
   defp build("start", []), do: :start
   defp build("start", words), do: {:start, Enum.join(words, ":")}
   defp build("run", words), do: {:run, Enum.join(words, ":")}
+  defp build("send", words), do: {:send, Enum.join(words, ":")}
   defp build("wander", []), do: :wander
   defp build("rest", []), do: :rest
   defp build("square", []), do: {:square, nil}
@@ -230,7 +234,7 @@ defmodule Robot.Command do
            ],
       do: {:ok, word}
 
-  def check({word, text}, known) when word in [:start, :run] and is_binary(text),
+  def check({word, text}, known) when word in [:start, :run, :send] and is_binary(text),
     do: parse("#{word}:#{text}", known)
 
   def check({:find_blob, "" <> colour}, known), do: parse("findblob:#{colour}", known)

@@ -120,6 +120,9 @@ defmodule Robot.Mission do
   The names of the commands for a running mission that it understands, beside `:start`, such as `[:formation]`. People are
   told that a robot does not take the others. A mission without this callback gets every command. One that names a command
   for one robot, such as `:move` (`Robot.Command`), gets that, too; without that the robot leaves the mission for it.
+
+  One that names a kind of its messages (`c:messages/0`) hears that kind from people, too, checked by its table, as
+  `{:command, {:message, kind, fields}}`: a person is no robot, so nothing that people write comes as a message of one.
   """
   @callback commands() :: [atom()]
 

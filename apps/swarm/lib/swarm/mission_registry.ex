@@ -60,6 +60,15 @@ defmodule Swarm.MissionRegistry do
   def phases,
     do: for({_name, module} <- known(), phase <- Mission.phases(module), uniq: true, do: phase)
 
+  @doc "The missions that hear messages of people, by name, with the kinds of these and their tables (`Robot.Mission.Letter.of_people/1`)."
+  @spec messages() :: [{name :: String.t(), [{kind :: atom(), Options.table()}, ...]}]
+  def messages do
+    for {name, module} <- known(),
+        {:ok, module} <- [loaded(module)],
+        [_ | _] = kinds <- [Mission.Letter.of_people(module)],
+        do: {Atom.to_string(name), kinds}
+  end
+
   @doc "What people call a mission: its name, or its module if it has none."
   @spec name(module()) :: String.t()
   def name(module) do

@@ -13,6 +13,8 @@ defmodule Swarm.Order do
   @fastest 10
   # Seconds.
   @longest_s 600
+  # Bytes of a message to a mission, as `Robot.Command` takes them.
+  @longest_text 500
   # Metres, as `Robot.Behaviour.Square` takes them.
   @least_side 0.2
   @most_side 10.0
@@ -88,6 +90,10 @@ defmodule Swarm.Order do
 
   defp known?(word) when word in [:stop, :lead, :start, :ping, :keep, :wander, :rest], do: true
   defp known?({:follow_the_leader, robot}), do: Wire.name?(robot)
+
+  defp known?({:send, text}),
+    do: is_binary(text) and byte_size(text) <= @longest_text and String.printable?(text)
+
   defp known?({:find_blob, colour}), do: colour == nil or is_binary(colour)
   defp known?({:formation, kind, spacing}), do: Formation.valid?({kind, spacing})
   defp known?({:start, options}), do: Keyword.keyword?(options)
@@ -122,12 +128,17 @@ defmodule Swarm.Order do
   @doc """
   An order in one short line, for logs.
 
-      iex> for order <- [:stop, {:estop, {:base@hall, 1, 1}}, {:goto, 1.0, -2.5, nil}, {:start, Some.Mission, []}],
+      iex> for order <- [:stop, {:estop, {:base@hall, 1, 1}}, {:goto, 1.0, -2.5, nil}, {:start, Some.Mission, []}, {:message, :leg, leg: 3}],
       ...>     do: Swarm.Order.words(order)
-      ["stop", "estop", "goto 1.0 -2.5", "start Some.Mission"]
+      ["stop", "estop", "goto 1.0 -2.5", "start Some.Mission", "send leg:leg=3"]
   """
   @spec words(term()) :: String.t()
   def words({:estop, _call}), do: "estop"
+
+  def words({:message, kind, fields}),
+    do:
+      "send #{kind}:" <>
+        Enum.map_join(fields, ",", fn {key, value} -> "#{key}=#{brief(value)}" end)
 
   def words(order) when is_tuple(order) and tuple_size(order) > 0,
     do: order |> Tuple.to_list() |> Enum.reject(&(&1 in [nil, []])) |> Enum.map_join(" ", &word/1)

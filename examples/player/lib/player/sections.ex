@@ -71,7 +71,9 @@ defmodule Player.Sections do
     with {:ok, body, rest} <- body(rest, at, file.defines, 1) do
       section = expand(old, at, body, file.defines)
 
-      top(rest, %{file | defines: Map.put(file.defines, new, section), size: grown(file, section)})
+      # Of two definitions with one name, Player takes the first.
+      defines = Map.put_new(file.defines, new, section)
+      top(rest, %{file | defines: defines, size: grown(file, section)})
     end
   end
 
@@ -133,6 +135,23 @@ defmodule Player.Sections do
 
   defp body([{_kind, line, value} | _rest], _at, _defines, _depth, _done),
     do: {:error, {line, "#{shown(value)} is not the name of an option"}}
+
+  @doc """
+  The name of a section's driver: newer files have `driver ( name "rflex" … )`, older ones `position:0 ( driver "rflex" … )`.
+
+      iex> {:ok, file} = Player.Sections.parse(~s|laser:0 ( driver "sicklms200" )|)
+      iex> Enum.map(file.sections, &Player.Sections.driver/1)
+      ["sicklms200"]
+  """
+  @spec driver(section()) :: String.t() | nil
+  def driver(section), do: text(section, "name") || text(section, "driver")
+
+  defp text(section, name) do
+    case List.keyfind(section.options, name, 0) do
+      {_name, _line, text} when is_binary(text) -> text
+      _none -> nil
+    end
+  end
 
   # A section's own options win over those of its definition.
   defp expand(type, line, body, defines) do

@@ -3,7 +3,8 @@ defmodule Player.Tokens do
   Splits a configuration file of the Player device server into tokens. Pure.
 
   A token is `{kind, line, value}`: `:word` (also `position:0`), `:number`, `:text` (in `"`),
-  `:mark` (`(`, `)`, `[`, `]`), `:end`. `#` begins a comment; commas count as blanks.
+  `:mark` (`(`, `)`, `[`, `]`), `:end`. `#` begins a comment; commas count as blanks. A number is what Player reads as one: a sign,
+  digits and a point. Lines end as Player's do, in LF, CR, or both.
   """
 
   @type token :: {:word | :number | :text | :mark | :end, line :: pos_integer(), term()}
@@ -22,7 +23,7 @@ defmodule Player.Tokens do
       {:error, {2, "the text that begins here has no closing \\""}}
   """
   @spec cut(String.t()) :: {:ok, [token()]} | {:error, {pos_integer(), String.t()}}
-  def cut(text), do: cut(text, 1, [])
+  def cut(text), do: text |> String.replace(["\r\n", "\n\r", "\r"], "\n") |> cut(1, [])
 
   defp cut("", line, done), do: {:ok, Enum.reverse([{:end, line, nil} | done])}
   defp cut("\n" <> rest, line, done), do: cut(rest, line + 1, done)
@@ -97,33 +98,29 @@ defmodule Player.Tokens do
         cut(rest, line, [{:number, line, number} | done])
 
       _no ->
-        {:error, {line, "#{binary_part(word, 0, min(byte_size(word), 40))} is not a number"}}
+        shown = binary_part(word, 0, min(byte_size(word), 40))
+        {:error, {line, "#{shown} is not a number: Player reads a sign, digits and a point"}}
     end
   end
 
-  defp parse("0x" <> digits), do: whole(Integer.parse(digits, 16))
-  defp parse("0X" <> digits), do: whole(Integer.parse(digits, 16))
-
-  # Numbers as C reads them: with a sign, leading zeros, and a point without digits on one side.
+  # As C reads them: with a sign, leading zeros, and a point without digits on one side. Player's own reader stops at another
+  # character, so it takes 1e-3 for 1, and 0x31 for 0.
   defp parse(word) do
-    case Regex.run(~r/^([-+]?)(\d*)(?:\.(\d*))?(?:[eE]([-+]?\d{1,2}))?$/, word) do
+    case Regex.run(~r/^([-+]?)(\d*)(?:\.(\d*))?$/, word) do
       [_, _sign, ""] ->
         :error
 
       [_, sign, whole] when byte_size(whole) <= 20 ->
         {:ok, signed(sign, String.to_integer(whole))}
 
-      [_, sign, whole, part | exponent] when (byte_size(whole) + byte_size(part)) in 1..40 ->
-        {float, ""} = Float.parse("#{zero(whole)}.#{zero(part)}e#{zero(Enum.join(exponent))}")
+      [_, sign, whole, part] when (byte_size(whole) + byte_size(part)) in 1..40 ->
+        {float, ""} = Float.parse("#{zero(whole)}.#{zero(part)}")
         {:ok, signed(sign, float)}
 
       _no ->
         :error
     end
   end
-
-  defp whole({number, ""}), do: {:ok, number}
-  defp whole(_no), do: :error
 
   defp signed("-", number), do: -number
   defp signed(_plus, number), do: number

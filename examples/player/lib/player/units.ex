@@ -10,6 +10,8 @@ defmodule Player.Units do
   Angles stay as they are written: `{:deg, 247.5}` is in degrees, a number is in radians.
   """
 
+  alias Player.Addresses
+
   @typedoc "Player 1.x or later; and what the file says its units are."
   @type context :: %{
           version: 1 | 2,
@@ -144,16 +146,8 @@ defmodule Player.Units do
     end
   end
 
-  defp provides?(section, interface) do
-    case List.keyfind(section.options, "provides", 0) do
-      {_name, _line, {:tuple, words}} -> Enum.any?(words, &device?(&1, interface))
-      {_name, _line, word} -> device?(word, interface)
-      nil -> device?(section.type, interface)
-    end
-  end
-
-  defp device?(word, interface) when is_binary(word), do: interface in String.split(word, ":")
-  defp device?(_number, _interface), do: false
+  defp provides?(section, interface),
+    do: Enum.any?(Addresses.provided(section), &(&1.interface == interface))
 
   defp unit_length({_name, "mm"}), do: 0.001
   defp unit_length({_name, "cm"}), do: 0.01

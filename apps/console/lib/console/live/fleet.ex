@@ -84,6 +84,10 @@ defmodule Console.Live.Fleet do
 
   defp carry_out({:place, who, place}, live), do: Fleet.place(live, who, place)
 
+  defp carry_out({:tell, target, {:send, text} = message}, live) do
+    with :ok <- Swarm.tell(target, message), do: Fleet.written(live, target, text)
+  end
+
   defp carry_out({:tell, target, command}, live) do
     with :ok <- on_floor(command, Fleet.scene(live).map), do: Swarm.tell(target, command)
   end

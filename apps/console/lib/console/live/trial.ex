@@ -140,7 +140,8 @@ defmodule Console.Live.Trial do
     with true <- stop? or state.stopped_us == nil or given_us >= state.stopped_us,
          {%_struct{} = trial, said} <- carry_out(command, state) do
       stopped_us = if stop?, do: System.monotonic_time(:microsecond), else: state.stopped_us
-      {:reply, said, %{state | trial: trial, stopped_us: stopped_us}}
+      state = %{state | trial: trial, stopped_us: stopped_us}
+      {:reply, said, %{state | messages: written(state, command, said)}}
     else
       false ->
         {:reply, {:error, "they were stopped after this command was given; repeat it"}, state}
@@ -161,6 +162,11 @@ defmodule Console.Live.Trial do
   end
 
   def handle_info({:step, _former}, state), do: {:noreply, state}
+
+  defp written(state, {:tell, to, {:send, text}}, {:ok, _accepted}),
+    do: Messages.person(state.messages, state.module.scene(state.trial).at_ms, to, text)
+
+  defp written(state, _command, _said), do: state.messages
 
   defp sent(%Trial{entries: entries}), do: entries |> Enum.reverse() |> Messages.of_entries()
   defp sent(_stand_in), do: []

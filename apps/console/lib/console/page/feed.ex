@@ -58,7 +58,7 @@ defmodule Console.Page.Feed do
       State.map(
         s.module.scene(s.live),
         s.module.offers(s.live),
-        Swarm.MissionRegistry.names(),
+        {Swarm.MissionRegistry.names(), Swarm.MissionRegistry.messages()},
         beside(s)
       )
 

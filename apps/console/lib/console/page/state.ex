@@ -5,6 +5,7 @@ defmodule Console.Page.State do
   alias Console.Picture.Floorplan
   alias Console.Pace
   alias Hal.Json
+  alias Hal.Options.Wording
   alias Sim.Scene
 
   # Of the stages the newest are told; the page keeps those before.
@@ -13,15 +14,41 @@ defmodule Console.Page.State do
   @cell 0.1
 
   @doc """
-  What does not change: what the fleet offers, the missions that it may start, and the map, its name, its size, and its walls as rectangles
+  What does not change: what the fleet offers, the missions that it may start, the kinds of messages that people may write to them
+  (`Swarm.MissionRegistry.messages/0`) with what each field may be, and the map, its name, its size, and its walls as rectangles
   `[x, y, width, height]`, rows of equal cells. Where there is no map, its size is 0. `beside` is the scene of the run beside it.
   """
-  @spec map(Scene.t(), [Console.Live.offer()], missions :: [String.t()], Scene.t() | nil) ::
-          String.t()
-  def map(%Scene{map: map}, offers, missions, beside \\ nil) do
-    beside = beside && ground(beside.map)
-    told = %{t: "map", offers: offers, missions: missions, cell: @cell, beside: beside}
+  @spec map(
+          Scene.t(),
+          [Console.Live.offer()],
+          {missions :: [String.t()], [{mission :: String.t(), [{atom(), Hal.Options.table()}]}]},
+          Scene.t() | nil
+        ) :: String.t()
+  def map(%Scene{map: map}, offers, {missions, messages}, beside \\ nil) do
+    told = %{
+      t: "map",
+      offers: offers,
+      missions: missions,
+      hears: Enum.map(messages, &hears/1),
+      cell: @cell,
+      beside: beside && ground(beside.map)
+    }
+
     map |> ground() |> Map.merge(told) |> Json.encode!()
+  end
+
+  defp hears({mission, kinds}) do
+    kinds =
+      for {kind, table} <- kinds do
+        fields = for {name, type} <- table, do: {name, type |> List.wrap() |> hd()}
+
+        %{
+          kind: kind,
+          fields: for({name, type} <- fields, do: %{name: name, allowed: Wording.expected(type)})
+        }
+      end
+
+    %{mission: mission, kinds: kinds}
   end
 
   defp ground(nil), do: %{name: nil, width: 0, height: 0, walls: []}

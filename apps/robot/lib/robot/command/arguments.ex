@@ -30,7 +30,9 @@ defmodule Robot.Command.Arguments do
   def value(:mission, text, _known), do: {:ok, text}
   def value(:behaviour, "", _known), do: {:error, "a behaviour's name"}
   def value(:behaviour, text, _known), do: {:ok, text}
-  def value(:options, text, _known), do: {:ok, text}
+  def value(:kind, "", _known), do: {:error, "a kind of message"}
+  def value(:kind, text, _known), do: {:ok, text}
+  def value(name, text, _known) when name in [:options, :fields], do: {:ok, text}
   def value(:found, "0", _known), do: {:ok, false}
   def value(:found, "1", _known), do: {:ok, true}
   def value(:found, _text, _known), do: {:error, "0 or 1"}

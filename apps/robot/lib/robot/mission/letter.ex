@@ -107,6 +107,19 @@ defmodule Robot.Mission.Letter do
     end
   end
 
+  @doc """
+  The kinds of messages, with their tables, that people may write to a mission: those that it names among its commands, too
+  (`c:Robot.Mission.commands/0`).
+
+      iex> Robot.Mission.Letter.of_people(Robot.Mission.Manual)
+      []
+  """
+  @spec of_people(module()) :: [{kind :: atom(), Options.table()}]
+  def of_people(mission) do
+    {_version, kinds} = messages(mission)
+    for {kind, table} <- kinds, is_list(table), Mission.names?(mission, kind), do: {kind, table}
+  end
+
   @doc "The version and the messages of a mission."
   @spec messages(module()) :: Mission.messages()
   def messages(mission),

@@ -17,7 +17,8 @@ defmodule Swarm.Comms.CommandHandler do
   | `:start`, `{:start, options}` | the group's mission starts; with options it starts again |
   | `{:start, mission, options}` | that mission starts, whatever runs (`Swarm.MissionRegistry`) |
   | `{:formation, kind, spacing}` | for the running mission |
-  | a `Robot.Command` | for this robot alone, which leaves the group's mission for it |
+  | `{:send, text}` | a message of a person to the running mission, of a kind that it hears from people (`Swarm.MissionRegistry.Text.message/2`) |
+  | another `Robot.Command` | for this robot alone, which leaves the group's mission for it |
   | `:present` | a person looks after the robot (`Swarm.present/0`) |
   | `:arm`, `:acknowledge` | for the wheels (`Hal.Device`): done, or why not |
 
@@ -35,6 +36,7 @@ defmodule Swarm.Comms.CommandHandler do
   alias Nav.{Grid, Reach}
   alias Mesh.Nonblocking
   alias Swarm.{BehaviourRegistry, MissionRegistry, Replacement, Status}
+  alias Swarm.MissionRegistry.Text
   alias Swarm.Order
   alias Swarm.Order.Freshness
   alias Swarm.Comms.PingReply
@@ -134,7 +136,7 @@ defmodule Swarm.Comms.CommandHandler do
   defp free(:arm, _config, _board, _heard), do: {:drive, :arm}
 
   defp free(request, config, board, heard) do
-    with {:ok, request} <- checked(request, config),
+    with {:ok, request} <- checked(request, config, board),
          :ok <- well(config, board),
          :ok <- ready(request, config, board),
          :ok <- attended(config, board, heard),
@@ -198,6 +200,10 @@ defmodule Swarm.Comms.CommandHandler do
           :ok | {:error, :no_formation | (line :: String.t())}
   def answer(:ok, _id, _command), do: :ok
   def answer({:error, :held}, id, _command), do: held(id)
+
+  def answer({:error, :idle}, id, {:message, _kind, _fields}),
+    do: {:error, "#{id} has another mission by now; repeat the message"}
+
   def answer({:error, :idle}, _id, _formation), do: {:error, :no_formation}
   def answer({:error, :no_mission}, id, _start), do: {:error, "#{id} has no such mission"}
   def answer({:error, line}, id, _command) when is_binary(line), do: {:error, "#{id}: #{line}"}
@@ -210,6 +216,14 @@ defmodule Swarm.Comms.CommandHandler do
   defp held(id), do: {:error, "#{id} is held by the emergency stop; reset it first"}
 
   # People use `Swarm`, which has checked everything; but any process may send something here.
+  defp checked({:send, _text} = request, %{id: id}, board) do
+    with {:ok, {:send, text}} <- Order.check(request),
+         {:error, line} <- Text.message(Board.fetch(board, :mission, :infinity, 0), text),
+         do: {:error, "#{id}: #{line}"}
+  end
+
+  defp checked(request, config, _board), do: checked(request, config)
+
   defp checked({:start, options}, config) do
     with {:ok, {:start, options}} <- Order.check({:start, options}),
          {:ok, {module, _defaults}} <- mission(config),
@@ -317,6 +331,10 @@ defmodule Swarm.Comms.CommandHandler do
   defp ways({:start, module, options}, _config), do: {:ok, [{:start, module, options}]}
   defp ways({:formation, _kind, _spacing}, _config), do: {:ok, [{:hand, {:taking, :formation}}]}
 
+  # What was checked by a mission's table is for that mission alone.
+  defp ways({:message, mission, _kind, _fields}, _config),
+    do: {:ok, [{:hand, {:only, mission}}]}
+
   # A mission may name such a command as one of its own.
   defp ways(alone, _config) do
     own = {:hand, {:naming, Robot.Command.name(alone)}}
@@ -336,5 +354,6 @@ defmodule Swarm.Comms.CommandHandler do
   # What the mission gets of a command that took one of its ways.
   defp command({:start, _options}), do: :start
   defp command({:start, _module, _options}), do: :start
+  defp command({:message, _mission, kind, fields}), do: {:message, kind, fields}
   defp command(request), do: request
 end

@@ -4,8 +4,10 @@ defmodule Swarm.MissionRegistry.Text do
   table (`c:Robot.Mission.option_table/0`). A value is a word (`square`, `on`), a number, `kind:number` (a formation's
   `wedge:1.2`), or Elixir's notation (`[{1,2},{3,4}]`). Pure; no text becomes an atom.
   """
-  alias Hal.Options.Type
+  alias Hal.Options
+  alias Hal.Options.{Suggest, Type}
   alias Robot.File.{Reader, Terms}
+  alias Robot.Mission.Letter
   alias Swarm.{BehaviourRegistry, MissionRegistry}
 
   @doc """
@@ -45,6 +47,41 @@ defmodule Swarm.MissionRegistry.Text do
   end
 
   def request(command, _robots), do: {:ok, command}
+
+  @doc """
+  The message of a person, `leg:leg=3`, to the mission that a robot runs, by what its board has of that: its kind, and its fields
+  as the mission's table has them (`Robot.Mission.Letter.of_people/1`). The error is one line that names the field and what is allowed.
+  """
+  @spec message(
+          {:ok, %{state: Robot.Mission.Runner.state()}, at_ms :: integer()} | :error,
+          String.t()
+        ) ::
+          {:ok, {:message, module(), kind :: atom(), fields :: keyword()}}
+          | {:error, line :: String.t()}
+  def message({:ok, %{state: {mission, _phase}}, _at_ms}, text) do
+    {word, fields} = split(text)
+    kinds = Letter.of_people(mission)
+
+    case Enum.find(kinds, fn {kind, _table} -> Atom.to_string(kind) == word end) do
+      {kind, table} ->
+        with {:ok, fields} <- options(word, table, fields),
+             {:ok, fields} <- Options.check(fields, table, "message #{word}"),
+             do: {:ok, {:message, mission, kind, fields}}
+
+      nil ->
+        unheard(MissionRegistry.name(mission), word, for({kind, _table} <- kinds, do: "#{kind}"))
+    end
+  end
+
+  def message(_idle, _text),
+    do: {:error, "it has no mission that could hear a message; start it first"}
+
+  defp unheard(mission, _word, []), do: {:error, "#{mission} hears no messages of people"}
+
+  defp unheard(mission, word, kinds) do
+    {:error,
+     "#{mission} hears of people #{Enum.join(kinds, ", ")}, not #{inspect(word)}#{Suggest.hint(word, kinds)}"}
+  end
 
   defp split(text) do
     case String.split(text, ":", parts: 2) do
