@@ -1,7 +1,7 @@
 defmodule Bench.Mesh do
   @moduledoc """
   Lists what `mix bench swarm` measures, and what it should beat: the cases with their goals, and JADE's
-  figures, which were measured separately. Pure. Times are microseconds, memory is bytes.
+  figures, which were measured separately. Pure. Times are microseconds, memory is bytes, shares are percent.
   """
   alias Hal.Cli.Parse
 
@@ -10,7 +10,7 @@ defmodule Bench.Mesh do
   @type case :: %{
           name: atom(),
           says: String.t(),
-          unit: :time | :memory | :rate,
+          unit: :time | :memory | :rate | :share,
           bare: atom() | nil
         }
 
@@ -24,6 +24,7 @@ defmodule Bench.Mesh do
     [
       at(:start, "start of all to a full mesh", :time, :start),
       at(:memory, "memory of a node, resident", :memory, :memory),
+      at(:cpu, "processor time of an idle robot's node, of one core", :share, :cpu),
       at(:ping, "command to all + all replies", :time, :ping),
       at(:gather, "envelope to all + all replies", :time, :ping),
       at(:round, "everyone to everyone", :time, :round),
@@ -75,6 +76,8 @@ defmodule Bench.Mesh do
   def goal(:kill, _size), do: {20 * @ms, nil}
   def goal(name, _size) when name in [:freeze, :silence], do: {2 * @s, nil}
   def goal(:memory, size) when size != :one, do: {60 * @mb, nil}
+  def goal(:cpu, 3), do: {0.8, nil}
+  def goal(:cpu, 30), do: {1.5, nil}
   def goal(:cold, _size), do: {1 * @s, nil}
   def goal(:start, 3), do: {1_500 * @ms, nil}
   def goal(:start, 10), do: {3 * @s, nil}

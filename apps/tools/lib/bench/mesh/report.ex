@@ -29,7 +29,7 @@ defmodule Bench.Mesh.Report do
   @spec draw([row()]) :: String.t()
   def draw(rows), do: Bench.Table.markdown(@heads, Enum.map(rows, &line/1))
 
-  @doc "The rows as a term for `Hal.Json.encode!/1`; microseconds, bytes, ticks a second."
+  @doc "The rows as a term for `Hal.Json.encode!/1`; microseconds, bytes, ticks a second, percent."
   @spec term([row()], map()) :: {:object, list()}
   def term(rows, about), do: {:object, [about: about, rows: Enum.map(rows, &object/1)]}
 
@@ -41,9 +41,10 @@ defmodule Bench.Mesh.Report do
       iex> {Bench.Mesh.Report.figure(52_428_800, :memory), Bench.Mesh.Report.figure(nil, :time)}
       {"50.0 MB", "–"}
   """
-  @spec figure(number() | nil, :time | :memory | :rate) :: String.t()
+  @spec figure(number() | nil, :time | :memory | :rate | :share) :: String.t()
   def figure(nil, _unit), do: "–"
   def figure(bytes, :memory), do: "#{Format.decimals(bytes / 1_048_576, 1)} MB"
+  def figure(percent, :share), do: "#{Format.decimals(percent, 2)} %"
   def figure(hz, :rate), do: "#{Format.decimals(hz, 1)}/s"
   def figure(us, :time) when us < 1_000, do: "#{Format.decimals(us, 0)} us"
   def figure(us, :time) when us < 1_000_000, do: "#{Format.decimals(us / 1_000, 1)} ms"
@@ -97,7 +98,7 @@ defmodule Bench.Mesh.Report do
        case: row.case.name,
        nodes: if(row.size == :one, do: 1, else: row.size),
        robots: row.robots,
-       unit: %{time: "us", memory: "bytes", rate: "1/s"}[row.case.unit],
+       unit: %{time: "us", memory: "bytes", rate: "1/s", share: "%"}[row.case.unit],
        ours: row.ours,
        bare: row.bare,
        goal: %{p50: p50, p99: p99}

@@ -11,6 +11,9 @@ defmodule Bench.Mesh.Runner do
   @talk [:ping, :gather, :round, :join]
   @patience_ms 10_000
   @rate_s 5
+  # Nodes that have just met compare their clocks more often.
+  @settle_s 5
+  @idle_s 15
 
   @typedoc """
   `share` is the share of the usual repetitions; `note` is called with what is going on.
@@ -62,6 +65,7 @@ defmodule Bench.Mesh.Runner do
       Nodes.call(base, s.code, :full, [count + 1, names], 60_000)
       memory = for node <- nodes, do: Vm.resident(node.vm)
       fixed = %{start: [[(full_ns - began_ns) / 1_000]], memory: [memory]}
+      fixed = if wanted?(s, :cpu), do: Map.put(fixed, :cpu, [idle(nodes)]), else: fixed
 
       fixed =
         for {name, values} <- fixed, wanted?(s, name), into: %{}, do: {name, Figures.of(values)}
@@ -71,6 +75,28 @@ defmodule Bench.Mesh.Runner do
       dead(s, slow(s, figures))
     after
       Nodes.stop(fleet)
+    end
+  end
+
+  # Of a core, in percent, once they have met.
+  defp idle(nodes) do
+    pause(@settle_s)
+    before = each(nodes, &spent_ms/1)
+    pause(@idle_s)
+
+    for {then, now} <- Enum.zip(before, each(nodes, &spent_ms/1)),
+        do: (now - then) / (10 * @idle_s)
+  end
+
+  defp spent_ms(node) do
+    {ms, _since_last} = Nodes.call(node, :erlang, :statistics, [:runtime])
+    ms
+  end
+
+  defp pause(seconds) do
+    receive do
+    after
+      seconds * 1_000 -> :ok
     end
   end
 
