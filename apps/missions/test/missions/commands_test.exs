@@ -91,6 +91,10 @@ defmodule Swarm.CommandsTest do
     assert state(id) == :idle
     assert order(fn -> Swarm.tell(id, "findblob") end) == :ok
     assert Swarm.tell(blind, "findblob") == {:error, "command_blind has no camera to look with"}
+
+    assert Swarm.tell(blind, "look:1") ==
+             {:error, "command_blind has no camera that it could turn"}
+
     assert order(fn -> Swarm.tell(id, "findblob:Red") end) == :ok
     assert state(id) == {Robot.Mission.Manual, :find_blob}
     # A full turn shows nothing.

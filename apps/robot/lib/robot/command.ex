@@ -13,6 +13,7 @@ defmodule Robot.Command do
   | `subscribe:NAME`, `unsubscribe:NAME` | `{:subscribe, id}`, `{:unsubscribe, id}`; see below |
   | `position:X:Y:THETA`, `follow:X:Y:THETA` | `{:position, pose}`, `{:follow, pose}` |
   | `blob:X:Y:THETA:SIZE:FOUND` | `{:blob, pose, size, found?}`; FOUND is 0 or 1 |
+  | `look:PAN` | `{:look, pan}`, where the camera looks from now on, radians, left positive |
   | `wander`, `rest`, `square` or `square:SIDE` | `:wander`, `:rest`, `{:square, metres or nil}` (`Robot.Behaviour`) |
   | `run:BEHAVIOUR` or `run:BEHAVIOUR:OPTIONS` | `{:run, text}`, a behaviour that the build has named, and its options in words (`Swarm.BehaviourRegistry`) |
   | `send:KIND` or `send:KIND:FIELDS` | `{:send, text}`, a message to the running mission, of a kind that it hears from people, and its fields in words (`Swarm.MissionRegistry.Text`) |
@@ -42,6 +43,7 @@ defmodule Robot.Command do
           | :arm
           | :disarm
           | :acknowledge
+          | {:look, float()}
           | {:move, float(), float()}
           | {:move, float(), float(), for_s :: float()}
           | {:goto, float(), float(), float() | nil}
@@ -65,6 +67,7 @@ defmodule Robot.Command do
     {"position", [:x, :y, :theta], []},
     {"blob", [:x, :y, :theta, :size, :found], []},
     {"follow", [:x, :y, :theta], []},
+    {"look", [:pan], []},
     {"lead", [], []},
     {"wander", [], []},
     {"rest", [], []},
@@ -178,6 +181,7 @@ defmodule Robot.Command do
   end
 
   defp build("stop", []), do: :stop
+  defp build("look", [pan]), do: {:look, pan}
   defp build("lead", []), do: :lead
   defp build("start", []), do: :start
   defp build("start", words), do: {:start, Enum.join(words, ":")}
@@ -251,6 +255,7 @@ defmodule Robot.Command do
   def check(command, _known)
       when is_tuple(command) and
              elem(command, 0) in [
+               :look,
                :move,
                :goto,
                :square,

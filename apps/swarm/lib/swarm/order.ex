@@ -11,6 +11,8 @@ defmodule Swarm.Order do
   # Farther than any floor, and faster than any robot: larger numbers are typing errors.
   @farthest 10_000
   @fastest 10
+  # Radians.
+  @behind 3.2
   # Seconds.
   @longest_s 600
   # Bytes of a message to a mission, as `Robot.Command` takes them.
@@ -45,6 +47,7 @@ defmodule Swarm.Order do
   def check({:goto, x, y, h}),
     do: numbers(:goto, [x, y, h], @farthest, &{:goto, &1, &2, turn(&3)})
 
+  def check({:look, pan}), do: numbers(:look, [pan], @behind, &{:look, &1})
   def check({:move, v, w}), do: numbers(:move, [v, w], @fastest, &{:move, &1, &2})
 
   def check({:move, v, w, for_s}) do

@@ -5,7 +5,7 @@ defmodule Swarm.OrderTest do
 
   test "valid commands of people pass unchanged" do
     for text <- ~w(goto:1:2 goto:1:2:3 move:0.1:0 findblob findblob:Red lead follow:1:2:0
-                   followtheleader:mag2 start ping) do
+                   followtheleader:mag2 look:-0.5 start ping) do
       {:ok, command} = Command.parse(text, [:mag2])
       assert Order.check(command) == {:ok, command}
     end

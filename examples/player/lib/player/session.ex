@@ -29,7 +29,7 @@ defmodule Player.Session do
 
   @enforce_keys [:robot, :body, :devices, :address, :port]
   defstruct @enforce_keys ++
-              [queue: %Queue{}, rest: "", open: [], shift: nil, goal: nil]
+              [queue: %Queue{}, rest: "", open: [], shift: nil, goal: nil, pan: nil]
 
   @type t :: %__MODULE__{
           robot: atom(),
@@ -41,7 +41,8 @@ defmodule Player.Session do
           rest: binary(),
           open: [Wire.device()],
           shift: Pose.t() | {:to, Pose.t()} | nil,
-          goal: Pose.t() | nil
+          goal: Pose.t() | nil,
+          pan: float() | nil
         }
 
   @typedoc """
@@ -239,6 +240,20 @@ defmodule Player.Session do
       goal == :unknown -> {session, []}
       true -> {%{session | goal: goal}, [{:order, goto(session.robot, goal)}]}
     end
+  end
+
+  # Only what has changed; zoom and tilt are the driver's.
+  defp command({:ptz, 1}, %{pan: pan}, session) when abs(pan) < @fast do
+    most =
+      with %{camera: %{max_pan: most}} <- session.body.profile,
+           do: most,
+           else: (_unknown -> @fast)
+
+    pan = pan |> Float.round(2) |> max(-most) |> min(most)
+
+    if pan == session.pan,
+      do: {session, []},
+      else: {%{session | pan: pan}, [{:order, "#{session.robot} look:#{number(pan)}"}]}
   end
 
   defp command({:speech, 1}, %{text: text}, session) do

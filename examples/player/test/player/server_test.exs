@@ -229,6 +229,25 @@ defmodule Player.ServerTest do
     assert still.va < 0.05
   end
 
+  test "the camera turns where it is told, no farther than it can", %{port: port} do
+    ptz = {8, 0}
+    client = port |> Client.open() |> pull()
+    {{:ack, 1, "convoy\0"}, client} = subscribe(client, ptz)
+
+    looks = fn client, pan, seen ->
+      client = command(client, ptz, 1, <<pan::float-32, 0::128>>)
+
+      {_pan, client} =
+        await(client, ptz, fn <<now::float-32, _rest::binary>> ->
+          if abs(now - seen) < 0.05, do: now
+        end)
+
+      client
+    end
+
+    client |> looks.(0.6, 0.6) |> looks.(-9.0, -1.74)
+  end
+
   test "goes to a place, in its own odometry", %{port: port} do
     client = driver(port)
     {:ack, "", client} = request(client, @position2d, 6)

@@ -13,6 +13,8 @@ defmodule Robot.Mission.Manual do
   where the robot is not sure to be, by the uncertainty of its pose, ends as `:done`, and the claim's `says` says so; a robot that
   does not know where it is on its floor plan (`Robot.Percept.astray/1`) has given up.
 
+  The camera looks ahead, or where a person has it look (`look`), whatever the robot does besides, unless its behaviour needs it.
+
   A robot that is followed need not do anything: its heartbeats are the position updates that a
   subscription asks for, so robots refuse a subscription. A follower keeps 1 m behind
   its leader, stands when it has not heard it for a second, and continues when it hears it again.
@@ -34,14 +36,15 @@ defmodule Robot.Mission.Manual do
   @unsure 0.5
 
   @enforce_keys [:me]
-  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil, why: nil]
+  defstruct @enforce_keys ++ [count: 0, command: nil, result: nil, why: nil, pan: 0.0]
 
   @type t :: %__MODULE__{
           me: atom(),
           count: non_neg_integer(),
           command: Command.t() | nil,
           result: integer() | nil,
-          why: String.t() | nil
+          why: String.t() | nil,
+          pan: float()
         }
 
   @doc """
@@ -67,12 +70,16 @@ defmodule Robot.Mission.Manual do
   def init(robot, _options),
     do: {:ready, %__MODULE__{me: robot}, [{:claim, %{phase: :idle, standing: true}}]}
 
+  # What it does besides goes on.
   @impl Robot.Mission
+  def handle({:command, {:look, pan}}, mission) when is_number(pan),
+    do: result(%{mission | pan: pan}, [{:look, pan}])
+
   def handle({:command, command}, mission) do
     with {_module, _options} = goal <- goal(command, nil), :ok <- Robot.Behaviour.check(goal) do
       mission = %{mission | command: command, count: mission.count + 1, result: nil, why: nil}
       goal = {:goal, {:command, mission.count}, goal}
-      result(mission, [goal, {:look, 0.0}, {:claim, claim(mission)}])
+      result(mission, [goal, {:look, mission.pan}, {:claim, claim(mission)}])
     else
       _no_command -> result(mission, [])
     end

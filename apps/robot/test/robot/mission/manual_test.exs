@@ -26,6 +26,16 @@ defmodule Robot.Mission.ManualTest do
         do: assert({:ready, ^mission, []} = Manual.handle({:command, command}, mission))
   end
 
+  test "the camera looks where it was told, also while another command is carried out" do
+    {:ready, mission, [{:look, 0.5}]} = tell(new(), "look:0.5")
+    {:goto, mission, effects} = tell(mission, "goto:2:1")
+    assert {:look, 0.5} in effects
+    assert {:goto, mission, [{:look, -1.0}]} = tell(mission, "look:-1")
+    {:move, _mission, effects} = tell(mission, "move:0.1:0")
+    assert {:look, -1.0} in effects
+    assert {:ready, _mission, []} = Manual.handle({:command, {:look, :left}}, new())
+  end
+
   test "each command is a goal of its own, and its outcome ends it" do
     {:goto, mission, [{:goal, tag, {Goto, x: 2.0, y: 1.0}} | _]} = tell(new(), "goto:2:1")
     {:goto, mission, [{:goal, next, _} | _]} = tell(mission, "goto:2:1")

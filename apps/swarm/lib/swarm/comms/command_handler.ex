@@ -292,6 +292,13 @@ defmodule Swarm.Comms.CommandHandler do
   defp possible({:follow_the_leader, leader}, %{id: id}, _board, {receiver, at_ms}),
     do: Order.follow(id, leader, Receiver.leaders(receiver, at_ms))
 
+  defp possible({:look, _pan}, %{ptz: nil, id: id}, _board, _heard),
+    do: {:error, "#{id} has no camera that it could turn"}
+
+  defp possible({:look, pan}, %{profile: %{camera: %{max_pan: most}}, id: id}, _board, _heard)
+       when abs(pan) > most,
+       do: {:error, "#{id} turns its camera by #{most} rad at most to each side, not by #{pan}"}
+
   defp possible({:find_blob, colour}, config, _board, _heard), do: known(colour, config)
   defp possible(_request, _config, _board, _heard), do: :ok
 
