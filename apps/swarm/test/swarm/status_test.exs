@@ -294,6 +294,7 @@ defmodule Swarm.StatusTest do
 
   test "a robot without a mission says how sure it is of its pose" do
     id = robot(:st_sure)
+    standing([id])
     assert eventually(fn -> is_float(Swarm.status(id).uncertainty) end)
     status = Swarm.status(id)
     assert status.uncertainty >= 0.0
