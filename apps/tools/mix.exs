@@ -8,7 +8,10 @@ defmodule Tools.MixProject do
       native: [
         nifs: [
           kernel:
-            for(name <- ~w(blobs runs masks), do: "../../vision/c_src/#{name}.c") ++
+            for(
+              name <- ~w(blobs runs masks masks_avx2 masks_avx512),
+              do: "../../vision/c_src/#{name}.c"
+            ) ++
               ["kernel_nif.c"]
         ]
       ],

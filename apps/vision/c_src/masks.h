@@ -9,8 +9,8 @@
 
 /* A mask of 32 classes is kept as up to four bytes, each in a plane of its own. */
 #define MASKS_PLANES 4
-/* The widest vector. Planes have so many zeros before them, and room up to a multiple of it. */
-#define MASKS_LANES 64
+/* The pixels of a step of the widest way. Planes have so many zeros before them, and room up to a multiple of it. */
+#define MASKS_LANES 128
 
 enum masks_way { MASKS_PORTABLE, MASKS_AVX2, MASKS_AVX512, MASKS_WAYS };
 
@@ -19,11 +19,14 @@ struct masks_tables {
     uint32_t source[768];       /* masks for Y, U, V */
     int planes;                 /* 0: not made yet */
     enum masks_way way;
-    /* Of each plane; of several planes, behind them, the chroma of eight groups of classes, rather too much than too little. */
-    uint8_t bytes[MASKS_PLANES + 1][768];
+    uint8_t bytes[MASKS_PLANES][768];
     /* By the upper and lower half of a value: inside the range; on its first sixteen, and from its beginning on; on its last sixteen,
        and up to its end. */
-    uint8_t halves[MASKS_PLANES + 1][3][5][16];
+    uint8_t halves[MASKS_PLANES][3][5][16];
+    /* Which planes may have a class in a cell of 16 values of U by 16 of V: a bit each, of U from 128 on in the upper half. */
+    uint8_t cells[128];
+    /* The same of each plane, and of any, by the upper half of U: a bit for each upper half of V, below 8 and from there on. */
+    uint8_t columns[MASKS_PLANES + 1][2][16];
 };
 
 /* One row; bit x % 64 of word x / 64 is pixel x, and those behind the last pixel are 0. */
@@ -32,6 +35,7 @@ struct masks_row {
     uint64_t *on;               /* of any class */
     uint64_t *left;             /* of the same classes as the pixel to the left, and of any */
     uint64_t *above;            /* as the pixel above */
+    uint8_t *planes_on;         /* of each word a bit for each plane that is not all 0 there; needed only of several */
 };
 
 /* Allows no better way than this, for tests; the best one that this processor then has. The portable one is that of runs.c. */

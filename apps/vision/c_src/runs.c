@@ -13,8 +13,9 @@ struct runs_rows {
     struct masks_tables tables;
     size_t width;
     uint32_t any;               /* of the pairs */
-    /* Pixel by pixel: the masks that the chroma of each pair allows. By bits: three rows in turn, each its planes, then its words,
-       from the first whole vector on. */
+    uint32_t *pairs;            /* pixel by pixel: the masks that the chroma of each pair allows */
+    struct masks_row in_turn[3]; /* by bits */
+    /* Of both, from the first whole vector on; of a row its planes, then its words and their planes. */
     uint8_t room[];
 };
 
@@ -25,12 +26,31 @@ static size_t lanes(size_t width)
 
 static size_t row_bytes(size_t width)
 {
-    return (MASKS_PLANES * (MASKS_LANES + lanes(width)) + 3 * lanes(width) / 8 + MASKS_LANES - 1) / MASKS_LANES * MASKS_LANES;
+    return (MASKS_PLANES * (MASKS_LANES + lanes(width)) + 3 * lanes(width) / 8 + lanes(width) / 64 + MASKS_LANES - 1) / MASKS_LANES * MASKS_LANES;
 }
 
 size_t runs_bytes(size_t width)
 {
     return sizeof(struct runs_rows) + MASKS_LANES + 3 * row_bytes(width);
+}
+
+static void lay_rows(struct runs_rows *rows)
+{
+    uint8_t *begin = rows->room + (MASKS_LANES - (uintptr_t)rows->room % MASKS_LANES);
+    size_t words = lanes(rows->width) / 64;
+
+    rows->pairs = (uint32_t *)begin;
+    for (int k = 0; k < 3; k++) {
+        struct masks_row *row = rows->in_turn + k;
+        uint8_t *at = begin + k * row_bytes(rows->width);
+
+        for (int plane = 0; plane < MASKS_PLANES; plane++, at += MASKS_LANES + lanes(rows->width))
+            row->planes[plane] = at + MASKS_LANES;
+        row->on = (uint64_t *)at;
+        row->left = row->on + words;
+        row->above = row->left + words;
+        row->planes_on = (uint8_t *)(row->above + words);
+    }
 }
 
 struct runs_rows *runs_room(struct runs_rows *rows, size_t width)
@@ -41,20 +61,8 @@ struct runs_rows *runs_room(struct runs_rows *rows, size_t width)
         return NULL;
     memset(grown, 0, runs_bytes(width));
     grown->width = width;
+    lay_rows(grown);
     return grown;
-}
-
-static struct masks_row row_at(struct runs_rows *rows, uint32_t row)
-{
-    uint8_t *at = rows->room + (MASKS_LANES - (uintptr_t)rows->room % MASKS_LANES) + row % 3 * row_bytes(rows->width);
-    struct masks_row found;
-
-    for (int k = 0; k < MASKS_PLANES; k++, at += MASKS_LANES + lanes(rows->width))
-        found.planes[k] = at + MASKS_LANES;
-    found.on = (uint64_t *)at;
-    found.left = found.on + lanes(rows->width) / 64;
-    found.above = found.left + lanes(rows->width) / 64;
-    return found;
 }
 
 void runs_begin(struct runs_rows *rows, const uint32_t tables[768])
@@ -136,11 +144,9 @@ static NOINLINE size_t find_portable(const struct blobs_picture *picture, uint32
 
 static size_t portable(struct runs_rows *rows, const struct blobs_picture *picture, uint32_t row, struct blobs_run *runs)
 {
-    uint32_t *pairs = (uint32_t *)(rows->room + (MASKS_LANES - (uintptr_t)rows->room % MASKS_LANES));
-
     if (row % picture->chroma_rows == 0)
-        rows->any = allow_chroma(picture, row, rows->tables.source, pairs);
-    return rows->any ? find_portable(picture, row, rows->tables.source, pairs, runs) : 0;
+        rows->any = allow_chroma(picture, row, rows->tables.source, rows->pairs);
+    return rows->any ? find_portable(picture, row, rows->tables.source, rows->pairs, runs) : 0;
 }
 
 /* --- by bits ---------------------------------------------------------------------------------------------------------------- */
@@ -224,16 +230,16 @@ static NOINLINE size_t find_by_bits(const struct masks_row *here, const uint64_t
 static size_t by_bits(struct runs_rows *rows, const struct blobs_picture *picture, uint32_t row, uint32_t min_area,
                       struct blobs_run *runs)
 {
-    struct masks_row above = row_at(rows, row + 2), here = row_at(rows, row), below = row_at(rows, row + 1);
+    struct masks_row *here = rows->in_turn + row % 3, *below = rows->in_turn + (row + 1) % 3;
     size_t words = (picture->width + 63) / 64;
 
     if (row == 0)
-        masks_find(&rows->tables, picture, 0, &above, &here);
+        masks_find(&rows->tables, picture, 0, rows->in_turn + 2, here);
     if (row + 1 < picture->height)
-        masks_find(&rows->tables, picture, row + 1, &here, &below);
+        masks_find(&rows->tables, picture, row + 1, here, below);
     else
-        memset(below.above, 0, words * sizeof *below.above);
-    return find_by_bits(&here, below.above, rows->tables.planes, words, min_area, runs);
+        memset(below->above, 0, words * sizeof *below->above);
+    return find_by_bits(here, below->above, rows->tables.planes, words, min_area, runs);
 }
 
 size_t runs_find(struct runs_rows *rows, const struct blobs_picture *picture, uint32_t row, uint32_t min_area,

@@ -1,4 +1,4 @@
-// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/runs.c
+// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/masks_avx2.c ../c_src/masks_avx512.c ../c_src/runs.c
 // flags: -Drealloc=scarce_realloc
 /* The blob finder where memory runs out: at each allocation in turn, and then the same scratch again. */
 #undef realloc

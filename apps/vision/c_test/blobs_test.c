@@ -1,4 +1,4 @@
-// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/runs.c
+// sources: ../c_src/blobs.c ../c_src/masks.c ../c_src/masks_avx2.c ../c_src/masks_avx512.c ../c_src/runs.c
 /* Random pictures of all sizes through the blob finder, one after the other in the same scratch, each
    compared with a flood fill, under sanitizers. The bytes are in blocks of exactly their size, so that
    a read beyond them is seen. */
@@ -70,16 +70,22 @@ static void flood(const struct blobs_picture *p, const uint32_t *tables, uint32_
     free(open);
 }
 
-/* Up to 32 classes that are ranges, as those of people are. */
+/* Up to 32 classes that are ranges, as those of people are: wide ones, or narrow ones that leave most of a picture to none. Some
+   take a whole axis, some are empty. */
 static void make_ranges(uint32_t tables[768])
 {
-    uint32_t classes = random_below(2) ? 1 + random_below(8) : 1 + random_below(32);
+    uint32_t classes = random_below(2) ? 1 + random_below(8) : 9 + random_below(24);
+    uint32_t widest = random_below(2) ? 256 : 1 + random_below(48);
 
     memset(tables, 0, 768 * sizeof *tables);
     for (uint32_t bit = 0; bit < classes; bit++)
         for (uint32_t channel = 0; channel < 3; channel++) {
-            uint32_t first = random_below(256), last = first + random_below(256 - first);
+            uint32_t first = random_below(256), last = first + random_below(256 - first < widest ? 256 - first : widest);
 
+            if (random_below(16) == 0)
+                continue;
+            if (random_below(channel ? 32 : 4) == 0)
+                first = 0, last = 255;
             for (uint32_t k = first; k <= last; k++)
                 tables[256 * channel + k] |= 1u << bit;
         }

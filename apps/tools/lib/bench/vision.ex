@@ -37,20 +37,23 @@ defmodule Bench.Vision do
   @spec kinds() :: [{atom(), String.t()}]
   def kinds, do: [easy: "easy", speckle: "5 % speckle", photograph: "photograph"]
 
-  @doc "The frames of a kind; those of the photograph are made from the file at `photo`."
-  @spec work(atom(), Path.t()) :: {:ok, work()} | {:error, String.t()}
-  def work(:easy, _photo), do: {:ok, make(:easy, Frames.easy(), Frames.classes())}
+  @doc "The frames of a kind with so many classes; those of the photograph are made from the file at `photo`."
+  @spec work(atom(), Path.t(), 8..32) :: {:ok, work()} | {:error, String.t()}
+  def work(kind, photo, count \\ 8)
 
-  def work(:speckle, _photo),
-    do: {:ok, make(:speckle, Frames.speckle(Frames.easy()), Frames.classes())}
+  def work(:easy, _photo, count),
+    do: {:ok, make(:easy, Frames.easy(), Frames.classes(), count)}
 
-  def work(:photograph, photo) do
+  def work(:speckle, _photo, count),
+    do: {:ok, make(:speckle, Frames.speckle(Frames.easy()), Frames.classes(), count)}
+
+  def work(:photograph, photo, count) do
     with {:ok, bytes} <- photograph(photo),
-         do: {:ok, make(:photograph, bytes, Frames.classes_of(bytes))}
+         do: {:ok, make(:photograph, bytes, Frames.classes_of(bytes), count)}
   end
 
-  defp make(name, bytes, classes) do
-    {:ok, colours} = Colours.new(classes)
+  defp make(name, bytes, classes, count) do
+    {:ok, colours} = Colours.new(Frames.more(classes, count))
     {width, height, _copies} = Frames.size()
     copies = Frames.rolled(bytes)
 

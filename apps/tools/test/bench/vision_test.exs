@@ -56,6 +56,16 @@ defmodule Bench.VisionTest do
 
   defp pairs(bytes), do: for(<<pair::binary-4 <- bytes>>, do: pair)
 
+  test "the further classes of a drawn frame are in none of its pixels", %{easy: easy} do
+    {:ok, more} = Vision.work(:easy, "no photo", 32)
+    assert length(more.colours.classes) == 32
+
+    for {frame, same} <- Enum.zip(Enum.take(easy.frames, 2), more.frames) do
+      {:ok, regions} = Elixir.Vision.Backend.Native.regions(frame, easy.colours)
+      assert {:ok, ^regions} = Elixir.Vision.Backend.Native.regions(same, more.colours)
+    end
+  end
+
   test "the classes of a picture are its own most frequent ones" do
     pair = fn u, v, times -> :binary.copy(<<100, u, 100, v>>, times) end
 

@@ -1,6 +1,6 @@
 defmodule Bench.Vision.Frames do
   @moduledoc """
-  Makes the frames that `mix bench vision` searches, 640x480 yuyv with eight classes each. Pure.
+  Makes the frames that `mix bench vision` searches, 640x480 yuyv with eight classes each, or more. Pure.
 
     * easy: nine ellipses and rectangles on a grey slope, each in the middle of its class, under
       noise of 3 (Y) and 2 (U, V);
@@ -45,10 +45,7 @@ defmodule Bench.Vision.Frames do
   @doc "The eight classes of the grid that are most frequent in a picture."
   @spec classes_of(yuyv :: binary()) :: [class()]
   def classes_of(bytes) do
-    places =
-      for u <- @grid, v <- @grid, not (u in [108, 148] and v in [108, 148]), into: %{} do
-        {{u, v}, 0}
-      end
+    places = Map.new(grid(), &{&1, 0})
 
     counts =
       for <<_y0, u, _y1, v <- bytes>>, reduce: places do
@@ -61,6 +58,25 @@ defmodule Bench.Vision.Frames do
     |> Enum.sort_by(fn {place, count} -> {-count, place} end)
     |> Enum.take(8)
     |> Enum.map(fn {place, _count} -> place(place) end)
+  end
+
+  @doc """
+  So many classes: these, and then those of the grid that share no colour with them. With 32 a frame has the same regions
+  as with its own eight, or others beside them.
+
+      iex> classes = Bench.Vision.Frames.more(Bench.Vision.Frames.classes(), 32)
+      iex> {length(classes), Enum.take(classes, 8) == Bench.Vision.Frames.classes()}
+      {32, true}
+  """
+  @spec more([class()], 8..32) :: [class()]
+  def more(classes, count) do
+    others =
+      for place <- grid(),
+          other = place(place),
+          not Enum.any?(classes, &share?(&1, other)),
+          do: other
+
+    Enum.take(classes ++ others, count)
   end
 
   @doc "The easy frame."
@@ -97,6 +113,17 @@ defmodule Bench.Vision.Frames do
       at = rem(k * (19 * 2 * @width + 4 * 26), byte_size(bytes))
       binary_part(bytes, at, byte_size(bytes) - at) <> binary_part(bytes, 0, at)
     end
+  end
+
+  # Without the cells next to grey.
+  defp grid,
+    do: for(u <- @grid, v <- @grid, not (u in [108, 148] and v in [108, 148]), do: {u, v})
+
+  defp share?(a, b) do
+    Enum.all?([:y, :u, :v], fn channel ->
+      {{first, last}, {low, high}} = {Map.fetch!(a, channel), Map.fetch!(b, channel)}
+      first <= high and low <= last
+    end)
   end
 
   defp place({u, v}) do

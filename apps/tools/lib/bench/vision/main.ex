@@ -12,8 +12,9 @@ defmodule Bench.Vision.Main do
 
   defp measure(given, folder) do
     rounds = Map.get(given, "rounds", 40)
+    classes = Map.get(given, "classes", 8)
     kinds = Map.get(given, "frames", Keyword.keys(Vision.kinds()))
-    plan = Map.merge(plan(given["beside"]), %{rounds: rounds, folder: folder})
+    plan = Map.merge(plan(given["beside"]), %{rounds: rounds, classes: classes, folder: folder})
     photo = Map.get_lazy(given, "photo", &photo/0)
 
     {measured, about} =
@@ -25,7 +26,7 @@ defmodule Bench.Vision.Main do
         end
       end)
 
-    about = Map.put(about, :rounds, rounds)
+    about = Map.merge(about, %{rounds: rounds, classes: classes})
     IO.write(Vision.Report.draw(plan.ways, measured))
     IO.puts("\n" <> words(about))
     json = Output.json(given["json"], Vision.Report.term(plan.ways, measured, about))
@@ -34,7 +35,7 @@ defmodule Bench.Vision.Main do
   end
 
   defp one(kind, photo, plan, note) do
-    case Vision.work(kind, photo) do
+    case Vision.work(kind, photo, plan.classes) do
       {:ok, work} ->
         Vision.Runner.run(work, plan.ways, plan.programs, plan.folder, plan.rounds, note)
 
@@ -62,7 +63,7 @@ defmodule Bench.Vision.Main do
   defp words(about) do
     {width, height, copies} = Vision.Frames.size()
 
-    "#{width}x#{height} yuyv, eight classes, #{copies} rolled copies in turn; the median of #{about.rounds} rounds, in each " <>
+    "#{width}x#{height} yuyv, #{about.classes} classes, #{copies} rolled copies in turn; the median of #{about.rounds} rounds, in each " <>
       "of which each way searches all copies. Ratios to the kernel in the same round.\n#{Load.words(about)}."
   end
 
@@ -72,6 +73,8 @@ defmodule Bench.Vision.Main do
     [
       {"rounds", "N", &Parse.whole(&1, 1..10_000), "how often each is measured (40)"},
       {"frames", "NAME,NAME", &kinds(&1, kinds), "which frames (easy,speckle,photograph)"},
+      {"classes", "N", &Parse.whole(&1, 8..32),
+       "so many classes: a frame's own eight, then others of a grid (8)"},
       {"photo", "FILE", &{:ok, &1}, "the photograph (fruits.jpg of bin/opencv-data)"},
       {"beside", "PROGRAM", &program/1,
        "a program that searches the same frames: PROGRAM FRAMES LIMITS WIDTH\nHEIGHT COUNT prints a line of microseconds for each"},
