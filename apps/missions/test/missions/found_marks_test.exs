@@ -89,6 +89,26 @@ defmodule Missions.FoundMarksTest do
     assert [{7, _seen}] = FoundMarks.known(FoundMarks.hear(torn, :mag2, said))
   end
 
+  test "what a lost robot reads counts for nothing, nor what is vague, nor what another robot may bear" do
+    here = percept(Pose.new(0, 0), 0, [{7, []}])
+    lost = &put_in(&1.uncertainty[:lost?], true)
+    vague = &put_in(&1.uncertainty.spread, {12.0, 0.1, 0.0})
+    beside = fn at -> &%{&1 | peers: %{mag2: %{pose: at, radius: 0.2}}} end
+
+    known = fn change ->
+      Enum.reduce(1..5, %FoundMarks{}, fn n, marks ->
+        detections = put_in(here.detections.at_ms, 100 * n).detections
+        marked = %{detections | marks: Enum.map(detections.marks, &%{&1 | at_ms: 100 * n})}
+        FoundMarks.look(marks, change.(%{here | at_ms: 100 * n, detections: marked}))
+      end)
+      |> FoundMarks.known()
+    end
+
+    assert [{7, _seen}] = known.(& &1)
+    assert [known.(lost), known.(vague), known.(beside.(Pose.new(2.3, 0.2)))] == [[], [], []]
+    assert [{7, _seen}] = known.(beside.(Pose.new(2, 1)))
+  end
+
   test "they are told in turn; what is no covariance is not heard, and memory has a bound" do
     marks = looked(Pose.new(0, 0), [{3, []}, {7, []}, {9, []}])
 
