@@ -59,6 +59,8 @@ defmodule Agents.ProgramsTest do
     assert ask(:prog1, 7, :echo) == {:inform, 7}
     assert {:inform, [{"echo", true} | _]} = ask(:prog1, :programs, :programs, :query)
     assert {:refuse, "echo runs on prog1 already"} = ask(:prog1, {:start, "echo", nil})
+    # What is no name is none's service.
+    :ok = :pg.join(Directory, {:service, 7, :prog1}, self())
     assert {:prog1, [:echo, :programs]} in Directory.services()
 
     assert {:inform, "echo"} = ask(:prog1, {:end, "echo", nil})
