@@ -13,8 +13,8 @@ defmodule Agents.Programs do
   | `:request`, `{:start, "battery", giver}` | `:inform`, `"battery"`, once it runs; `:refuse` with one line |
   | `:request`, `{:end, "battery", giver}` | `:inform`, `"battery"`, once it has ended; `:refuse` with one line |
 
-  The giver is the text of `Swarm.by/2` or `nil`; the robot's log has it. A program ends with its robot, and when a part of the robot that it
-  comes after is restarted. It is not started again, nor is one that crashes, which takes no part of the robot along. One that hangs is killed
+  The giver is the text of `Swarm.by/2` or `nil`; the robot's log has it. A program ends when its robot ends, and when a
+  part of the robot crashes. One that crashes takes no part of the robot along. None is started again by itself. One that hangs is killed
   after 0.3 s when it is to end; one that hangs while it starts keeps all others from starting and ending. What the robot's file has as a
   companion is none of these: it is not ended here.
 
