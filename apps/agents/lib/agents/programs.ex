@@ -13,8 +13,10 @@ defmodule Agents.Programs do
   | `:request`, `{:start, "battery", giver}` | `:inform`, `"battery"`, once it runs; `:refuse` with one line |
   | `:request`, `{:end, "battery", giver}` | `:inform`, `"battery"`, once it has ended; `:refuse` with one line |
 
-  The giver is the text of `Swarm.by/2` or `nil`; the robot's log has it. A program ends with its robot. One that crashes is not started again, and
-  takes no part of the robot along. What the robot's file has as a companion is none of these: it is not ended here.
+  The giver is the text of `Swarm.by/2` or `nil`; the robot's log has it. A program ends when its robot ends, and when a
+  part of the robot crashes. One that crashes takes no part of the robot along. None is started again by itself. One that hangs is killed
+  after 0.3 s when it is to end; one that hangs while it starts keeps all others from starting and ending. What the robot's file has as a
+  companion is none of these: it is not ended here.
 
       Robot.Supervisor mag1
       `-- Agents.Programs
@@ -31,6 +33,9 @@ defmodule Agents.Programs do
   @behaviour Responder
 
   @service :programs
+  # How long the end of a program may take, and that of all: the robot's supervisor waits meanwhile, and restarts nothing.
+  @end_ms 300
+  @end_all_ms 1_000
 
   @typedoc "The programs of a build: by the name of the service the module, with its argument or without."
   @type catalogue :: [{atom(), module() | {module(), argument :: term()}}]
@@ -51,7 +56,8 @@ defmodule Agents.Programs do
   @impl Supervisor
   def init({robot, catalogue}) do
     answers = [service: @service, module: __MODULE__, argument: catalogue]
-    running = {DynamicSupervisor, strategy: :one_for_one, name: Names.via(robot, @service)}
+    options = [strategy: :one_for_one, name: Names.via(robot, @service)]
+    running = Supervisor.child_spec({DynamicSupervisor, options}, shutdown: @end_all_ms)
     Supervisor.init([running, {Responder, {robot, answers}}], strategy: :rest_for_one)
   end
 
@@ -98,7 +104,7 @@ defmodule Agents.Programs do
 
     case DynamicSupervisor.start_child(
            Names.via(s.robot, @service),
-           Map.put(spec, :restart, :temporary)
+           Map.merge(spec, %{restart: :temporary, shutdown: @end_ms})
          ) do
       {:ok, _pid} -> :ok
       {:error, {:already_started, _pid}} -> {:error, "#{name} runs on #{s.robot} already"}

@@ -33,6 +33,9 @@ defmodule Agents.Responder do
 
   @behaviour Robot.Companion
 
+  # A program that does not come up within this time does not start.
+  @init_ms 10_000
+
   @type answer ::
           {Envelope.performative(), content :: term()}
           | {Envelope.performative(), content :: term(), options :: keyword()}
@@ -93,7 +96,7 @@ defmodule Agents.Responder do
         )
 
     via = Names.via(name, {:service, options[:service]})
-    GenServer.start_link(__MODULE__, {name, options}, name: via)
+    GenServer.start_link(__MODULE__, {name, options}, name: via, timeout: @init_ms)
   end
 
   # The exports of a module are known only once it is loaded.

@@ -11,8 +11,26 @@ defmodule Agents.ProgramsTest do
     def handle(_envelope, s), do: {:noreply, s}
   end
 
-  defp host(robot) do
-    catalogue = [echo: Echo, power: {Echo, 11.5}, broken: Broken]
+  defmodule Hangs do
+    @behaviour Agents.Responder
+    @impl Agents.Responder
+    def init(_robot, {:start, test}), do: hang(test)
+    def init(_robot, test), do: test
+
+    @impl Agents.Responder
+    def handle(%{content: :hang}, test) do
+      Process.flag(:trap_exit, true)
+      hang(test)
+    end
+
+    defp hang(test) do
+      send(test, {:hangs, self()})
+      receive do: (:go_on -> {:noreply, test})
+    end
+  end
+
+  defp host(robot, more \\ []) do
+    catalogue = [echo: Echo, power: {Echo, 11.5}, broken: Broken] ++ more
     host = start_supervised!(Programs.child_spec({%{config(robot) | id: robot}, catalogue}))
     eventually(fn -> Directory.members({:service, :programs, robot}) != [] end)
     host
@@ -41,6 +59,8 @@ defmodule Agents.ProgramsTest do
     assert ask(:prog1, 7, :echo) == {:inform, 7}
     assert {:inform, [{"echo", true} | _]} = ask(:prog1, :programs, :programs, :query)
     assert {:refuse, "echo runs on prog1 already"} = ask(:prog1, {:start, "echo", nil})
+    # What is no name is none's service.
+    :ok = :pg.join(Directory, {:service, 7, :prog1}, self())
     assert {:prog1, [:echo, :programs]} in Directory.services()
 
     assert {:inform, "echo"} = ask(:prog1, {:end, "echo", nil})
@@ -75,6 +95,25 @@ defmodule Agents.ProgramsTest do
     assert {:inform, "echo"} = ask(:prog2, {:start, "echo", nil})
     :ok = stop_supervised(Programs)
     assert_receive {:DOWN, ^power, :process, _pid, :shutdown}
+  end
+
+  test "one that hangs is ended, and does not hold up the end of its robot" do
+    for {robot, argument, name} <- [{:prog5, {:start, self()}, "slow"}, {:prog6, self(), "deaf"}] do
+      host(robot, slow: {Hangs, argument}, deaf: {Hangs, argument})
+      request = Envelope.new(:request, :desk, {:start, name, nil})
+      :ok = Conversation.tell({robot, :programs}, request)
+
+      if name == "deaf" do
+        eventually(fn -> Directory.members({:service, :deaf, robot}) != [] end)
+        :ok = Conversation.tell({robot, :deaf}, Envelope.new(:request, :desk, :hang))
+      end
+
+      assert_receive {:hangs, program}
+      if name == "deaf", do: assert({:inform, "deaf"} = ask(robot, {:end, "deaf", nil}))
+      {us, :ok} = :timer.tc(fn -> stop_supervised(Programs) end)
+      assert us < 3_000_000
+      send(program, :go_on)
+    end
   end
 
   test "one that is a part of the robot is not ended here" do

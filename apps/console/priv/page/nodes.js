@@ -12,10 +12,10 @@ export class Nodes extends Watched {
   draw() {
     if (!this.on) return;
     const focused = document.activeElement?.dataset?.program;
-    write(by("nodes-note"), this.why ? `Not known here: ${this.why}.` : "Programs answer other programs. They drive no robot, and end with theirs.");
+    write(by("nodes-note"), this.why ? `Not known here: ${this.why}.` : "Programs answer other programs, and end with their robot.");
     by("nodes").closest("table").hidden = this.entries.length === 0;
     by("nodes").replaceChildren(...this.entries.flatMap((node) => this.node(node)));
-    if (focused) by("nodes").querySelector(`[data-program="${focused}"]`)?.focus();
+    if (focused) by("nodes").querySelector(`[data-program="${CSS.escape(focused)}"]`)?.focus();
   }
 
   node({ node, state, robots }) {

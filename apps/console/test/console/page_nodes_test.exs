@@ -2,7 +2,7 @@ defmodule Console.PageNodesTest do
   @moduledoc "The nodes of a fleet and their programs on the page, in a browser, with robots that are processes."
   use ExUnit.Case, async: false
   import Console.PageCase
-  alias Console.{Browser, Live, Options, PageCase}
+  alias Console.{Browser, FakeLive, Live, Options, PageCase}
   @moduletag :realtime
   @moduletag :capture_log
   @moduletag skip: PageCase.why_not() || false
@@ -60,6 +60,26 @@ defmodule Console.PageNodesTest do
     # A robot that dies is no more on its node.
     {:ok, _done} = Live.Fleet.command(live, {:kill, :min1})
     Browser.await(browser, "return document.querySelectorAll('#nodes button').length === 1")
+    assert Browser.errors(browser) == []
+    Browser.close(browser)
+  end
+
+  test "a button keeps the focus when what is shown is told anew, whatever its program is called" do
+    {live, browser} = shown(FakeLive.of([{:mag1, {0.0, 0.0}, []}]), [])
+
+    place = fn runs? ->
+      program = %{name: "a\\\"b", runs: runs?, ours: true}
+      robot = %{id: :mag1, why: nil, programs: [program]}
+      node = %{node: "one@desk", state: "this node", robots: [robot]}
+      FakeLive.place(live, {:ok, [node]})
+    end
+
+    place.(true)
+    click(browser, "#tab-nodes")
+    Browser.await(browser, "return document.querySelectorAll('#nodes button').length === 1")
+    Browser.run(browser, "document.querySelector('#nodes button').focus()")
+    place.(false)
+    Browser.await(browser, "return document.activeElement.textContent === 'Start'")
     assert Browser.errors(browser) == []
     Browser.close(browser)
   end

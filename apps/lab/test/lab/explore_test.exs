@@ -63,7 +63,8 @@ defmodule Lab.ExploreTest do
     :ok = Nav.MapFile.save(file, Missions.Explore.map(mission))
     assert {:ok, %{marks: marks}} = Nav.MapFile.open(file)
 
-    for {id, {x, y, turn}} <- marks do
+    for {id, {x, y, turn, sd}} <- marks do
+      assert sd > 0.0
       {true_x, true_y, degrees} = Map.fetch!(Map.new(at), id)
       assert :math.sqrt((x - true_x) ** 2 + (y - true_y) ** 2) < 0.3
       assert abs(Hal.Pose.wrap(turn - degrees * :math.pi() / 180)) < 0.1

@@ -59,9 +59,14 @@ defmodule Missions.FoundMarksTest do
     assert xx > yy and FoundMarks.hung(marks) == []
 
     marks = looked(marks, Pose.new(0, 0), [{7, yaw: 0.1, yaw_sd: 0.05}], 1, 300)
-    assert [{7, {x, _y, turn}}] = FoundMarks.hung(marks)
+    assert [{7, {x, _y, turn, sd}}] = FoundMarks.hung(marks)
+    assert sd > 0.05 and sd < 0.15
     assert_in_delta x, 2.0, 1.0e-9
     assert_in_delta turn, 0.1 - :math.pi(), 1.0e-9
+    # Vaguer sightings from afar take nothing from it.
+    [{7, {good, _turn}}] = FoundMarks.known(marks)
+    far = looked(marks, Pose.new(0, 0), [{7, range_sd: 2.0, bearing_sd: 0.5}], 3, 400)
+    assert [{7, {^good, _turn}}] = FoundMarks.known(far)
     # Two marks of one number in a picture are none.
     assert FoundMarks.known(looked(Pose.new(0, 0), [{7, []}, {7, []}])) == []
   end
@@ -87,6 +92,26 @@ defmodule Missions.FoundMarksTest do
     assert FoundMarks.known(torn) == [] and FoundMarks.layer(torn) == []
     {said, _marks} = told(here)
     assert [{7, _seen}] = FoundMarks.known(FoundMarks.hear(torn, :mag2, said))
+  end
+
+  test "what a lost robot reads counts for nothing, nor what is vague, nor what another robot may bear" do
+    here = percept(Pose.new(0, 0), 0, [{7, []}])
+    lost = &put_in(&1.uncertainty[:lost?], true)
+    vague = &put_in(&1.uncertainty.spread, {12.0, 0.1, 0.0})
+    beside = fn at -> &%{&1 | peers: %{mag2: %{pose: at, radius: 0.2}}} end
+
+    known = fn change ->
+      Enum.reduce(1..5, %FoundMarks{}, fn n, marks ->
+        detections = put_in(here.detections.at_ms, 100 * n).detections
+        marked = %{detections | marks: Enum.map(detections.marks, &%{&1 | at_ms: 100 * n})}
+        FoundMarks.look(marks, change.(%{here | at_ms: 100 * n, detections: marked}))
+      end)
+      |> FoundMarks.known()
+    end
+
+    assert [{7, _seen}] = known.(& &1)
+    assert [known.(lost), known.(vague), known.(beside.(Pose.new(2.3, 0.2)))] == [[], [], []]
+    assert [{7, _seen}] = known.(beside.(Pose.new(2, 1)))
   end
 
   test "they are told in turn; what is no covariance is not heard, and memory has a bound" do

@@ -113,6 +113,17 @@ defmodule Missions.PatrolTest do
     assert {0, nil} = tick.(%Motivation{active: 0}, silent, %{}, @tau_ms)
   end
 
+  test "by rules a robot takes a point in a fleet of two hundred, where all points are due and a silent robot was at each" do
+    alias Missions.Patrol.Helping
+    tasks = for number <- 0..63, do: task(number, far: 1.0 + number)
+    free = for n <- 64..199, into: %{}, do: {:"r#{n}", peer(nil, at_ms: @tau_ms)}
+    silent = for n <- 0..63, into: %{}, do: {:"r#{n}", peer(n, at_ms: 0)}
+    bids = Map.new(free, fn {id, _peer} -> {id, Map.new(0..63, &{&1, 80.0})} end)
+    peers = Map.merge(free, silent)
+    assert {%{active: 0}, why} = Helping.tick(%Motivation{}, :mag1, tasks, peers, @tau_ms, bids)
+    assert hd(why) =~ "helps"
+  end
+
   test "by rules a robot says why it took its point" do
     {runner, _effects} = tick(patrol(by: :rules), 0)
     {runner, _effects} = tick(runner, 100)

@@ -22,11 +22,15 @@ defmodule Nav.MapFile do
   @enforce_keys [:file, :grid]
   defstruct @enforce_keys ++ [marks: []]
 
-  @typedoc "`marks` are the printed marks that hang there: id, and place and heading in the map (metres, radians)."
+  @typedoc "`marks` are the printed marks that hang there: id, and place and heading in the map (metres, radians), with the standard deviation of the place where
+  the file says it."
   @type t :: %__MODULE__{
           file: Path.t(),
           grid: Grid.t(),
-          marks: [{non_neg_integer(), {float(), float(), float()}}]
+          marks: [
+            {non_neg_integer(),
+             {float(), float(), float()} | {float(), float(), float(), sd :: float()}}
+          ]
         }
 
   @doc """

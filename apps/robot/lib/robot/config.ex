@@ -194,7 +194,7 @@ defmodule Robot.Config do
   @doc "The option type of `marks`."
   @spec marks() :: Options.Type.t()
   def marks do
-    place = {:tuple, List.duplicate({:number, -1.0e6, 1.0e6}, 3), "{x, y, heading}"}
+    place = {:check, &place?/1, "{x, y, heading}"}
     known = {:list, {:tuple, [{:integer, 0, 65_535}, place], "{id, {x, y, heading}}"}}
 
     bears =
@@ -202,6 +202,13 @@ defmodule Robot.Config do
 
     {:keys, Vision.Marks.table() ++ [known: known, robots: {:list, bears}]}
   end
+
+  # The standard deviation of the place may follow.
+  defp place?(place),
+    do:
+      is_tuple(place) and tuple_size(place) in 3..4 and
+        Enum.all?(Tuple.to_list(place), &(is_number(&1) and abs(&1) <= 1.0e6)) and
+        (tuple_size(place) == 3 or elem(place, 3) >= 0)
 
   @doc "The option type of `presence`."
   @spec presence() :: Options.Type.t()

@@ -88,7 +88,12 @@ defmodule Swarm.Directory do
   @spec services() :: [{robot :: atom(), [service :: atom(), ...]}]
   def services do
     groups = if running?(), do: :pg.which_groups(__MODULE__), else: []
-    offers = for {:service, service, robot} <- Enum.sort(groups), do: {robot, service}
+    # Any node may enter anything.
+    offers =
+      for {:service, service, robot} when is_atom(service) and is_atom(robot) <-
+            Enum.sort(groups),
+          do: {robot, service}
+
     offers |> Enum.group_by(&elem(&1, 0), &elem(&1, 1)) |> Enum.sort()
   end
 

@@ -161,9 +161,12 @@ defmodule Player.Connection do
     %{s | session: Session.scene(s.session, message, module.scene(live), now_s())}
   end
 
-  # To stand still is no client's privilege.
-  defp effect({:drive, ahead, left}, s) when ahead == 0 and left == 0,
-    do: s |> tap(&drive(&1, {0.0, 0.0})) |> begun(:stood_ms, "#{s.robot} stands", {:ok, "begins"})
+  # To stand still is no client's privilege. One that drove is not silent by that, and keeps the robot.
+  defp effect({:drive, ahead, left}, s) when ahead == 0 and left == 0 do
+    drive(s, {0.0, 0.0})
+    _may_drive = s.drove_ms && s.claim.(s.who)
+    begun(s, :stood_ms, "#{s.robot} stands", {:ok, "begins"})
+  end
 
   defp effect({:drive, ahead, left}, s) do
     case s.claim.(s.who) do

@@ -248,6 +248,31 @@ defmodule Player.ServerTest do
     client |> looks.(0.6, 0.6) |> looks.(-9.0, -1.74)
   end
 
+  test "a client that drove, and now says that it stands, is not silent: no other drives", %{
+    port: port
+  } do
+    client = port |> driver() |> velocity(0.0, 0.2)
+    {_at, client} = await(client, @position2d, &if(position(&1).va > 0.1, do: position(&1)))
+    now_ms = fn -> System.monotonic_time(:millisecond) end
+    until_ms = now_ms.() + 1_500
+
+    turned =
+      fn -> nil end
+      |> Stream.repeatedly()
+      |> Stream.transform({client, driver(port)}, fn _nil, {client, other} ->
+        if now_ms.() < until_ms do
+          {at, client} = client |> velocity(0.0, 0.0) |> await(@position2d, &position/1)
+          {[at.va], {client, velocity(other, 0.0, -0.5)}}
+        else
+          {:halt, nil}
+        end
+      end)
+      |> Enum.to_list()
+
+    assert length(turned) >= 10
+    assert Enum.min(turned) > -0.05
+  end
+
   test "goes to a place, in its own odometry", %{port: port} do
     client = driver(port)
     {:ack, "", client} = request(client, @position2d, 6)

@@ -50,15 +50,24 @@ defmodule Console.Page.Client do
     {:noreply, %{s | looked: robot}}
   end
 
-  def handle_cast({:watch, what, true}, s), do: {:noreply, ask(s, what, nil)}
+  # One question at a time, however often a page asks.
+  def handle_cast({:watch, what, on?}, s) do
+    case s.watched do
+      %{^what => {:asked, ref, _on?, _told}} ->
+        {:noreply, put_in(s.watched[what], {:asked, ref, on?, nil})}
 
-  def handle_cast({:watch, what, false}, s),
-    do: {:noreply, %{s | watched: Map.delete(s.watched, what)}}
+      _not_asked when on? ->
+        {:noreply, ask(s, what, nil)}
+
+      _not_asked ->
+        {:noreply, %{s | watched: Map.delete(s.watched, what)}}
+    end
+  end
 
   defp ask(s, what, told) do
     {module, live} = {s.module, s.live}
     %Task{ref: ref} = Task.async(fn -> {what, apply(module, what, [live])} end)
-    put_in(s.watched[what], {ref, told})
+    put_in(s.watched[what], {:asked, ref, true, told})
   end
 
   # Only what differs from what was told last.
@@ -66,18 +75,20 @@ defmodule Console.Page.Client do
   def handle_info({ref, {what, now}}, s) when is_reference(ref) do
     Process.demonitor(ref, [:flush])
 
-    with %{^what => {^ref, told}} <- s.watched do
-      if now != told, do: s.reply.(State.watched(what, now))
-      _timer = Process.send_after(self(), {:ask, what, ref}, @watched[what])
-      {:noreply, put_in(s.watched[what], {ref, now})}
-    else
-      _asked_no_more_or_anew -> {:noreply, s}
+    case s.watched do
+      %{^what => {:asked, ^ref, true, told}} ->
+        if now != told, do: s.reply.(State.watched(what, now))
+        _timer = Process.send_after(self(), {:ask, what, ref}, @watched[what])
+        {:noreply, put_in(s.watched[what], {:told, ref, now})}
+
+      %{^what => {:asked, ^ref, false, _told}} ->
+        {:noreply, %{s | watched: Map.delete(s.watched, what)}}
     end
   end
 
   def handle_info({:ask, what, ref}, s) do
     case s.watched do
-      %{^what => {^ref, told}} -> {:noreply, ask(s, what, told)}
+      %{^what => {:told, ^ref, told}} -> {:noreply, ask(s, what, told)}
       _asked_no_more_or_anew -> {:noreply, s}
     end
   end

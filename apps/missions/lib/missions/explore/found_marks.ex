@@ -3,11 +3,12 @@ defmodule Missions.Explore.FoundMarks do
   Keeps where printed marks hang, as robots that explore have seen them: each robot's sightings of a mark are one place with its uncertainty, and those
   of all robots are one again (`Robot.Localiser.MarkPlace`). Pure; metres and radians in the map frame, on the air whole millimetres and milliradians.
 
-  A sighting counts when the mark was read in three frames in a row. Once a second a robot tells one of those that it has seen itself, in turn. A mark
-  at whose place robots contradict each other is nowhere: two hang there with one number, or a robot is lost.
+  A sighting counts when the mark was read in three frames in a row, by a robot that is not lost. One at another robot does not: that may
+  bear the mark. Once a second a robot tells one of those that it has seen itself, in turn. A mark
+  at whose place robots contradict each other is nowhere: two hang there with one number, or a robot is elsewhere than it believes.
   """
   alias Hal.Pose
-  alias Robot.Localiser.MarkPlace
+  alias Robot.Localiser.{Anchors, MarkPlace}
   alias Robot.Percept
   alias Vision.Marks.Streaks
 
@@ -16,6 +17,9 @@ defmodule Missions.Explore.FoundMarks do
   @most_robots 64
   @far_mm 10_000_000
   @most_mm2 100_000_000
+  # The greatest standard deviation that can be told, and how far beside a robot's body a mark that it bears may be read (metres).
+  @worst 10.0
+  @borne 0.5
 
   defstruct streaks: %{}, at_ms: nil, own: %{}, told: %{}, known: %{}, last: nil
 
@@ -51,6 +55,7 @@ defmodule Missions.Explore.FoundMarks do
   @doc "Takes the marks that were read in the percept's picture."
   @spec look(t(), Percept.t()) :: t()
   def look(marks, %Percept{detections: nil}), do: marks
+  def look(marks, %Percept{uncertainty: %{lost?: true}}), do: %{marks | streaks: %{}}
   def look(%{at_ms: at_ms} = marks, %Percept{detections: %{at_ms: at_ms}}), do: marks
 
   def look(marks, %Percept{detections: picture} = percept) do
@@ -58,11 +63,21 @@ defmodule Missions.Explore.FoundMarks do
 
     for mark <- read,
         place = MarkPlace.of(percept, mark),
+        hangs?(place, percept),
         reduce: %{marks | streaks: streaks, at_ms: picture.at_ms} do
       marks ->
         own = put(marks.own, mark.id, {place, turn(percept, mark)})
         know(%{marks | own: own}, mark.id)
     end
+  end
+
+  defp hangs?({at, variances}, %{peers: peers}) do
+    {worst, _least, _direction} = Anchors.spread(variances)
+
+    worst <= @worst and
+      not Enum.any?(peers, fn {_id, peer} ->
+        Pose.distance(at, Pose.point(peer.pose)) < peer.radius + @borne
+      end)
   end
 
   defp turn(_percept, %{yaw: nil}), do: nil
@@ -77,11 +92,11 @@ defmodule Missions.Explore.FoundMarks do
 
   defp put(own, _id, _one_too_many), do: own
 
-  # What contradicts what it saw before is believed if it is surer: it has found its place since.
+  # What contradicts what it saw before is believed if it is surer: it has found its place since. Vaguer sightings take nothing from a good one.
   defp join({before, facing}, {now, turned} = seen) do
     case MarkPlace.fuse([before, now]) do
       nil -> if spread(now) < spread(before), do: seen, else: {before, facing}
-      place -> {place, surest([facing, turned])}
+      place -> {Enum.min_by([before, place], &spread/1), surest([facing, turned])}
     end
   end
 
@@ -144,10 +159,17 @@ defmodule Missions.Explore.FoundMarks do
   @spec known(t()) :: [{Vision.Mark.id(), seen()}]
   def known(%__MODULE__{known: known}), do: Enum.sort(known)
 
-  @doc "Those for the description of a map, which says of each how it is turned: `{id, {x, y, turn}}`."
-  @spec hung(t()) :: [{Vision.Mark.id(), {float(), float(), float()}}]
-  def hung(marks),
-    do: for({id, {{{x, y}, _var}, {turn, _sd}}} <- known(marks), do: {id, {x, y, turn}})
+  @doc """
+  Those for the description of a map, which says of each how it is turned, and how sure its place is: `{id, {x, y, turn, sd}}`, the greatest
+  standard deviation.
+  """
+  @spec hung(t()) :: [{Vision.Mark.id(), {float(), float(), float(), sd :: float()}}]
+  def hung(marks) do
+    for {id, {{{x, y}, variances}, {turn, _sd}}} <- known(marks) do
+      {worst, _least, _direction} = Anchors.spread(variances)
+      {id, {x, y, turn, worst}}
+    end
+  end
 
   @doc "What is drawn of them (`t:Robot.Mission.layer/0`)."
   @spec layer(t()) :: Robot.Mission.layer()
@@ -158,8 +180,8 @@ defmodule Missions.Explore.FoundMarks do
     end
   end
 
-  defp point(id, {{{x, y}, {xx, xy, yy}}, _turn}) do
-    {worst, _least, _direction} = Robot.Localiser.Anchors.spread({xx, xy, yy})
-    {x, y, "mark #{id} ±#{:erlang.float_to_binary(2 * worst, decimals: 2)} m"}
+  defp point(id, {{{x, y}, variances}, _turn}) do
+    radius = variances |> Anchors.spread() |> Anchors.radius()
+    {x, y, "mark #{id} ±#{:erlang.float_to_binary(radius, decimals: 2)} m"}
   end
 end

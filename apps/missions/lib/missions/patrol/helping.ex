@@ -7,7 +7,7 @@ defmodule Missions.Patrol.Helping do
 
   | fact | means |
   |---|---|
-  | `near(far_m, robot, point)` | how far a free robot is from a point that is due |
+  | `near(far_m, robot, point)` | how far one of the 20 nearest free robots is from a point that is due |
   | `due(point)` | the point is due |
   | `visits(robot, point, busy_s)` | a robot is at a point, for so long |
   | `silent(robot, point)` | a robot was at a point, and has said nothing for 5 s |
@@ -18,6 +18,9 @@ defmodule Missions.Patrol.Helping do
   use Swarm.Rules
   alias Missions.Patrol.{Auction, Motivation}
   alias Swarm.Rules
+
+  # Of so many free robots, the nearest to a point, the rules hear: those of a thousand for 64 points would conclude more than they may.
+  @nearest 20
 
   rule "what a silent robot was at needs help", priority: 20 do
     silent(robot, point)
@@ -79,11 +82,8 @@ defmodule Missions.Patrol.Helping do
     free = for {id, %{doing: nil}} <- heard, do: id
     own = Map.new(tasks, &{&1.number, &1.far})
 
-    near =
-      for {id, costs} <- bids |> Map.take(free) |> Map.put(me, own),
-          number <- due,
-          far = costs[number],
-          do: {:near, Float.round(far * 1.0, 1), id, number}
+    bids = bids |> Map.take(free) |> Map.put(me, own)
+    near = for number <- due, {far, id} <- nearest(bids, number), do: {:near, far, id, number}
 
     visits =
       for {id, %{doing: number} = peer} <- heard,
@@ -92,5 +92,10 @@ defmodule Missions.Patrol.Helping do
 
     lost = for {id, %{doing: number}} <- silent, number != nil, do: {:silent, id, number}
     Enum.map(due, &{:due, &1}) ++ near ++ visits ++ lost
+  end
+
+  defp nearest(bids, number) do
+    far = for {id, costs} <- bids, far = costs[number], do: {Float.round(far * 1.0, 1), id}
+    far |> Enum.sort() |> Enum.take(@nearest)
   end
 end

@@ -4,7 +4,7 @@ defmodule Nav.MapFile.Description do
   # (a file beside it), `resolution` (metres a pixel), `origin` (`[x, y, turn]`: where the lower left
   # corner of the picture lies, and how far it is turned round that, counterclockwise in radians), and
   # optionally `occupied_thresh`, `free_thresh`, `negate` and `mode`; and `marks`, which map_server ignores: a list of lines
-  # `- [id, x, y, turn]`, where printed marks hang in the map and how each faces (metres, radians).
+  # `- [id, x, y, turn]`, where printed marks hang in the map and how each faces (metres, radians), or `- [id, x, y, turn, sd]` with the standard deviation of the place.
   # Read as data: no other YAML is understood, other keys are ignored. Pure.
   #
   # A pixel is as occupied as it is dark, from 0 to 1, or as it is light if `negate` is 1. What is not
@@ -23,7 +23,11 @@ defmodule Nav.MapFile.Description do
           shades: Nav.MapFile.Runs.marks(),
           known: Nav.MapFile.Runs.marks(),
           transparent: byte(),
-          marks: [{id :: non_neg_integer(), {x :: float(), y :: float(), turn :: float()}}]
+          marks: [
+            {id :: non_neg_integer(),
+             {x :: float(), y :: float(), turn :: float()}
+             | {x :: float(), y :: float(), turn :: float(), sd :: float()}}
+          ]
         }
 
   # Radians; a whole turn is as good as none, and a number of degrees is a mistake.
@@ -201,16 +205,17 @@ defmodule Nav.MapFile.Description do
     end
   end
 
-  defp mark([_id, _x, _y, _turn] = parts) do
-    with [id, x, y, turn] <- Enum.map(parts, &parsed(String.trim(&1))),
-         true <- Enum.all?([id, x, y, turn], &is_float/1),
+  # The standard deviation of the place may follow.
+  defp mark(parts) do
+    with [id, x, y, turn | sd] = all when length(sd) <= 1 <-
+           Enum.map(parts, &parsed(String.trim(&1))),
+         true <- Enum.all?(all, &is_float/1),
          true <- id == trunc(id) and id >= 0.0 and id <= 65_535.0,
          true <- abs(x) <= 1.0e6 and abs(y) <= 1.0e6 and abs(turn) <= @most_turn,
-         do: {trunc(id), {x, y, turn}},
+         true <- Enum.all?(sd, &(&1 >= 0.0 and &1 <= 1.0e6)),
+         do: {trunc(id), List.to_tuple([x, y, turn | sd])},
          else: (_wrong -> nil)
   end
-
-  defp mark(_too_few_or_many), do: nil
 
   defp negate(text) when text in ~w(0 false), do: {:ok, false}
   defp negate(text) when text in ~w(1 true), do: {:ok, true}

@@ -15,7 +15,9 @@ defmodule Nav.MapFile.Writer do
           :left => integer(),
           :low => integer(),
           :cell => float(),
-          optional(:marks) => [{id :: non_neg_integer(), {float(), float(), turn :: float()}}]
+          optional(:marks) => [
+            {id :: non_neg_integer(), {float(), float(), turn :: float(), sd :: float()}}
+          ]
         }
 
   @doc """
@@ -28,10 +30,10 @@ defmodule Nav.MapFile.Writer do
       iex> {:ok, description} = Nav.MapFile.Description.parse(IO.iodata_to_binary(yaml))
       iex> {description.image, description.resolution, description.origin}
       {"found.pgm", 0.1, {-1.0, 0.5, 0.0}}
-      iex> {yaml, _pgm} = Nav.MapFile.Writer.encode(Map.put(map, :marks, [{7, {1.5, -2.0, 1.571}}]), "found.pgm")
+      iex> {yaml, _pgm} = Nav.MapFile.Writer.encode(Map.put(map, :marks, [{7, {1.5, -2.0, 1.571, 0.25}}]), "found.pgm")
       iex> {:ok, description} = Nav.MapFile.Description.parse(IO.iodata_to_binary(yaml))
       iex> description.marks
-      [{7, {1.5, -2.0, 1.571}}]
+      [{7, {1.5, -2.0, 1.571, 0.25}}]
   """
   @spec encode(raster(), image :: String.t()) :: {yaml :: iodata(), pgm :: iodata()}
   def encode(%{width: width, height: height, cell: cell} = map, image) do
@@ -55,8 +57,8 @@ defmodule Nav.MapFile.Writer do
 
   defp marks(marks) do
     lines =
-      for {id, {x, y, turn}} <- marks,
-          do: "  - [#{id}, #{metres(x)}, #{metres(y)}, #{metres(turn)}]\n"
+      for {id, {x, y, turn, sd}} <- marks,
+          do: "  - [#{id}, #{metres(x)}, #{metres(y)}, #{metres(turn)}, #{metres(sd)}]\n"
 
     ["marks:\n" | lines]
   end

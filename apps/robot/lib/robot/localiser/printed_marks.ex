@@ -19,9 +19,11 @@ defmodule Robot.Localiser.PrintedMarks do
   alias Vision.Mark
   alias Vision.Marks.Streaks
 
-  # How exactly people measure where a mark hangs (metres), and how it is turned (radians).
+  # How exactly people measure where a mark hangs (metres), and how it is turned (radians). One whose place is vaguer than this finds no
+  # robot that is lost.
   @place_sd 0.03
   @turn_sd 0.03
+  @vague_place 0.3
   # What the pose is known to is not improved (metres, radians).
   @exact 0.04
   @exact_turn 0.01
@@ -36,22 +38,29 @@ defmodule Robot.Localiser.PrintedMarks do
 
   @typedoc "Where the marks hang and face, which were read of late, and where the robot may be by those that contradict its belief."
   @type t :: %__MODULE__{
-          known: %{Mark.id() => Pose.t()},
+          known: %{Mark.id() => {Pose.t(), sd :: float()}},
           robots: %{Mark.id() => atom()},
           streaks: Streaks.t(),
           hypotheses: Hypotheses.t() | nil
         }
 
   @doc """
-  What a robot is told of marks: `known: [{id, {x, y, heading}}]`, where they hang (metres, radians), and `robots: [{id, name}]`, which
-  robots bear them.
+  What a robot is told of marks: `known: [{id, {x, y, heading}}]`, where they hang (metres, radians), as people measure it, or
+  `{x, y, heading, sd}` with the standard deviation of the place, and `robots: [{id, name}]`, which robots bear them.
 
-      iex> Robot.Localiser.PrintedMarks.new(known: [{7, {1.0, 2.0, 0.5}}], size: 0.2).known
-      %{7 => Hal.Pose.new(1.0, 2.0, 0.5)}
+      iex> Robot.Localiser.PrintedMarks.new(known: [{7, {1.0, 2.0, 0.5}}, {8, {0.0, 0.0, 0.0, 0.25}}], size: 0.2).known
+      %{7 => {Hal.Pose.new(1.0, 2.0, 0.5), 0.03}, 8 => {Hal.Pose.new(0, 0), 0.25}}
   """
   @spec new(keyword()) :: t()
   def new(marks) do
-    known = for {id, {x, y, heading}} <- marks[:known] || [], do: {id, Pose.new(x, y, heading)}
+    known =
+      for {id, place} <- marks[:known] || [] do
+        {x, y, heading, sd} =
+          if tuple_size(place) == 3, do: Tuple.insert_at(place, 3, 0.0), else: place
+
+        {id, {Pose.new(x, y, heading), max(sd * 1.0, @place_sd)}}
+      end
+
     %__MODULE__{known: Map.new(known), robots: Map.new(marks[:robots] || [])}
   end
 
@@ -95,23 +104,24 @@ defmodule Robot.Localiser.PrintedMarks do
     end
   end
 
-  defp judge(%{belief: belief} = localiser, {mark, at}, {_percept, back, corrects?} = picture) do
+  defp judge(%{belief: belief} = localiser, {mark, {at, _sd} = place}, picture) do
+    {_percept, back, corrects?} = picture
     exposed = Pose.compose(belief.pose, back)
 
     cond do
       vague?(localiser) or Pose.distance(exposed, Pose.point(at)) < @near ->
-        suspect(localiser, {mark, at}, picture)
+        suspect(localiser, {mark, place}, picture)
 
-      Enum.all?(measurements(belief, exposed, mark, at), &fits?(belief, &1)) ->
+      Enum.all?(measurements(belief, exposed, mark, place), &fits?(belief, &1)) ->
         printed = localiser.printed
         localiser = %{localiser | printed: %{printed | hypotheses: nil}}
 
         if corrects?,
-          do: %{localiser | belief: corrected(belief, back, mark, at)},
+          do: %{localiser | belief: corrected(belief, back, mark, place)},
           else: localiser
 
       true ->
-        suspect(localiser, {mark, at}, picture)
+        suspect(localiser, {mark, place}, picture)
     end
   end
 
@@ -126,12 +136,12 @@ defmodule Robot.Localiser.PrintedMarks do
     do: error * error <= @gate * (Belief.variance(belief, slope) + noise)
 
   # One after the other, because the first ones move the belief.
-  defp corrected(belief, back, mark, at) do
-    count = length(measurements(belief, Pose.compose(belief.pose, back), mark, at))
+  defp corrected(belief, back, mark, place) do
+    count = length(measurements(belief, Pose.compose(belief.pose, back), mark, place))
 
     Enum.reduce(0..(count - 1), belief, fn k, belief ->
       exposed = Pose.compose(belief.pose, back)
-      {error, slope, noise, exact} = measurements(belief, exposed, mark, at) |> Enum.at(k)
+      {error, slope, noise, exact} = measurements(belief, exposed, mark, place) |> Enum.at(k)
 
       if Belief.variance(belief, slope) > exact * exact,
         do: Belief.measured(belief, error, slope, @repeated * noise),
@@ -142,18 +152,19 @@ defmodule Robot.Localiser.PrintedMarks do
   # Innovation, derivatives by x, y and heading, variance of the noise, and how exact it can be: along the line of sight, across it
   # and of the yaw. The robot stands at this distance from the mark, in a direction that it knows as well as its heading, so where
   # the mark is, is a linear function of the position, however vague that is; of the heading it is an arc.
-  defp measurements(belief, exposed, mark, at) do
+  defp measurements(belief, exposed, mark, {at, sd}) do
     {dx, dy} = {at.x - exposed.x, at.y - exposed.y}
     direction = exposed.heading + mark.bearing
     {ux, uy} = {:math.cos(direction), :math.sin(direction)}
     {along, across} = Sightings.arc(Belief.variance(belief, {0.0, 0.0, 1.0}), mark.range)
-    place = @place_sd * @place_sd
+    place = sd * sd
+    exact = max(@exact, sd)
     aside = mark.range * mark.bearing_sd
 
     [
       {ux * dx + uy * dy - mark.range, {ux, uy, 0.0},
-       mark.range_sd * mark.range_sd + place + along, @exact},
-      {ux * dy - uy * dx, {-uy, ux, mark.range}, aside * aside + place + across, @exact}
+       mark.range_sd * mark.range_sd + place + along, exact},
+      {ux * dy - uy * dx, {-uy, ux, mark.range}, aside * aside + place + across, exact}
     ] ++ yaw(exposed, mark, at)
   end
 
@@ -169,7 +180,11 @@ defmodule Robot.Localiser.PrintedMarks do
   end
 
   # The mark is not where it should be seen from here, or nothing is known of where that is.
-  defp suspect(%{printed: printed} = localiser, {mark, at}, {percept, back, _corrects?}) do
+  defp suspect(localiser, {_mark, {_at, sd}}, _picture) when sd > @vague_place, do: localiser
+
+  defp suspect(%{printed: printed} = localiser, {mark, {at, _sd}}, picture) do
+    {percept, back, _corrects?} = picture
+
     hypotheses =
       case printed.hypotheses do
         nil -> Hypotheses.new(mark, at, back, percept)
